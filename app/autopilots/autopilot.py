@@ -10,6 +10,7 @@ from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setti
 from app.autopilots.dialects import Dialect, Message
 from app.autopilots.gains import GainSet
 from app.autopilots.measurements import Measurement, VehicleEvent
+from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import GainlineError
 
 ReferenceSource = Literal["replica", "error", "target"]
@@ -201,6 +202,9 @@ class Autopilot:
     """Returns the messages that end an exploration, successful or not."""
     refer_to_ground: Callable[[Target], tuple[Step, ...]] = lambda _target: ()
     """Returns the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
+
+    simulated: Callable[[], tuple[SimulatedKind, ...]] = lambda: ()
+    """Loads its simulated counterparts, the default first."""
 
     def measure(self, message: Message) -> Measurement | None:
         """Read a message; None if it contains no measurement."""

@@ -8,9 +8,10 @@ from types import MappingProxyType
 from typing import ClassVar, Final, Protocol
 
 from app.autopilots.dialects import FieldValue
+from app.autopilots.simulated.body import TICK_S, Fields, OutgoingMessage, SimulatedAutopilot
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
-from app.simdrone.body import TICK_S, Autopilot, Body, Fields, OutgoingMessage
+from app.simdrone.body import Body
 from app.simdrone.motion_capture import MotionCapture
 
 CONNECT: Final = "connect"
@@ -36,7 +37,7 @@ class FaultTarget(Protocol):
     """Parts of a drone that a fault can change."""
 
     body: Body
-    autopilot: Autopilot
+    autopilot: SimulatedAutopilot
     cameras: MotionCapture
 
     def reboot(self) -> None: ...

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from app.autopilots.dialects import COMMON, FieldValue
-from app.simdrone.body import OutgoingMessage
+from app.autopilots.simulated.body import OutgoingMessage
 from app.vehicles.mavlink.transports import LinkError, Transport, open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, SourceAddress, StreamAddress
 

@@ -16,12 +16,12 @@ import pytest
 from typer.testing import CliRunner
 
 from app.autopilots.dialects import number, text
+from app.autopilots.px4.simulated import Px4
 from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.copter_parameters import Parameters
 from app.campaigns.campaign_files import read_preset
 from app.cli.commands import app
 from app.core.clock import ScaledClock
-from app.simdrone.copter_parameters import Parameters
-from app.simdrone.px4 import Px4
 from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.link import Link

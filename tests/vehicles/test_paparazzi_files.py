@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from app.autopilots.paparazzi import simulated_plan as simulated
 from app.autopilots.paparazzi.profile import BLOCKS, LAND, PAPARAZZI, TAKE_OFF
-from app.simdrone import paparazzi_plan as simulated
 from app.vehicles.mavlink.preflight import POSITIONS_HZ
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.simulated import FLIGHT_S

@@ -9,6 +9,7 @@ from app.autopilots.commands import Action, Setting, Step, Target
 from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.autopilots.gains import on_board
 from app.autopilots.measurements import DISARMING, Measurement
+from app.autopilots.simulated.body import SimulatedKind
 from app.core.control.ardupilot_parameters import LOOP_NAMES, NEWER_NAMES, UNSUPPORTED
 from app.core.experiments.takeoff import ARDUPILOT_GAINS
 
@@ -65,6 +66,13 @@ _READERS: Final[mavlink.Readers] = {
     "ATTITUDE_TARGET": mavlink.commanded_throttle,
 }
 
+
+def _simulated() -> tuple[SimulatedKind, ...]:
+    from app.autopilots.ardupilot.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
+
+    return KINDS
+
+
 ARDUPILOT: Final = Autopilot(
     name="ardupilot",
     title="ArduCopter",
@@ -107,6 +115,7 @@ ARDUPILOT: Final = Autopilot(
     telemetry=commands.COPTER_TELEMETRY,
     set_point_telemetry=(commands.ALTITUDE_ERROR, commands.FOLLOWED_TARGET, commands.DEMANDED_THROTTLE),
     steps=_steps,
+    simulated=_simulated,
 )
 """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth. It does not arm
 without an integral gain of the acceleration. The hover throttle is not learned in flights with several set points: the

@@ -11,6 +11,7 @@ from app.autopilots.dialects import PAPARAZZI as DIALECT
 from app.autopilots.dialects import Message, number, text
 from app.autopilots.gains import GainParameter
 from app.autopilots.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
+from app.autopilots.simulated.body import SimulatedKind
 
 WAIT_GPS: Final = "Wait GPS"
 GEO_INIT: Final = "Geo init"
@@ -166,6 +167,13 @@ _READERS: Final[mavlink.Readers] = {
     "AUTOPILOT_VERSION": _version,
 }
 
+
+def _simulated() -> tuple[SimulatedKind, ...]:
+    from app.autopilots.paparazzi.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
+
+    return KINDS
+
+
 PAPARAZZI: Final = Autopilot(
     name="paparazzi",
     title="Paparazzi",
@@ -207,6 +215,7 @@ PAPARAZZI: Final = Autopilot(
     readers=_READERS,
     reports_version=False,
     steps=_steps,
+    simulated=_simulated,
     holds_first=False,
     explore=_explore,
     conclude=_conclude,

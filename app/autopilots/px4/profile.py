@@ -12,6 +12,7 @@ from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import on_board
 from app.autopilots.measurements import DISARMING, Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
+from app.autopilots.simulated.body import SimulatedKind
 from app.core.control.px4_parameters import (
     ESTIMATOR_NAMES,
     HOVER_RANGE_NAME,
@@ -114,6 +115,13 @@ _READERS: Final[mavlink.Readers] = {
     "POSITION_TARGET_LOCAL_NED": mavlink.target_altitude,
 }
 
+
+def _simulated() -> tuple[SimulatedKind, ...]:
+    from app.autopilots.px4.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
+
+    return KINDS
+
+
 PX4: Final = Autopilot(
     name="px4",
     title="PX4",
@@ -152,6 +160,7 @@ PX4: Final = Autopilot(
     arming_checks=Px4ArmingChecks,
     checks=ChecksRequest(_RUN_PREARM_CHECKS, last=HEALTH_SUMMARY),
     steps=_steps,
+    simulated=_simulated,
     needs_stream=True,
     make_armable=_make_armable,
 )

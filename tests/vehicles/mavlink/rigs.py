@@ -19,12 +19,11 @@ import pytest
 
 from app.autopilots.dialects import Message, number, text
 from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.body import TICK_S, Make
+from app.autopilots.simulated.copter import Copter
 from app.core.policy import Gains
-from app.simdrone.body import TICK_S
-from app.simdrone.copter import Copter
 from app.simdrone.drone import Drone, Lockstep
 from app.simdrone.motion_capture import open_outlet
-from app.simdrone.registry import Make
 from app.vehicles import registry as open_module
 from app.vehicles.base import Identity, OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse

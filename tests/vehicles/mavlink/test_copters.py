@@ -14,10 +14,10 @@ import pytest
 from app.autopilots.dialects import Message
 from app.autopilots.measurements import VehicleEvent
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, Px4ArmingChecks
+from app.autopilots.px4.simulated import Px4
+from app.autopilots.simulated.body import OutgoingMessage
 from app.simdrone import faults
-from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
-from app.simdrone.px4 import Px4
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest, VehicleError
 from app.vehicles.mavlink.vehicle import STANDSTILL_S, MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from app.autopilots.dialects import FieldValue
+from app.autopilots.paparazzi.simulated import Paparazzi
 from app.autopilots.registry import AUTOPILOTS
-from app.simdrone.body import OutgoingMessage
-from app.simdrone.paparazzi import Paparazzi
+from app.autopilots.simulated.body import OutgoingMessage
 from app.vehicles.base import CheckItem, SafeGainsError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import TUNED, never, unwatched

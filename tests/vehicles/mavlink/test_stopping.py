@@ -6,10 +6,9 @@ from contextlib import closing
 import pytest
 
 from app.autopilots.dialects import number
-from app.simdrone.body import Autopilot, Body
-from app.simdrone.paparazzi import Paparazzi
-from app.simdrone.paparazzi_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
-from app.simdrone.registry import Make
+from app.autopilots.paparazzi.simulated import Paparazzi
+from app.autopilots.paparazzi.simulated_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
+from app.autopilots.simulated.body import Body, Make, SimulatedAutopilot
 from app.vehicles.base import (
     FlightOptions,
     FlightRecord,
@@ -41,7 +40,7 @@ class DeafToCommands(Paparazzi):
 
 
 def of(kind: type[Paparazzi] = Paparazzi, **how: str | float) -> Make:
-    def make(body: Body, system: int) -> Autopilot:
+    def make(body: Body, system: int) -> SimulatedAutopilot:
         return kind(body, system=system, **how)  # type: ignore[arg-type]
 
     return make

@@ -12,9 +12,9 @@ from app.autopilots.autopilot import Autopilot
 from app.autopilots.dialects import FieldValue, Message, number
 from app.autopilots.measurements import Measurement, Throttle
 from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.body import OutgoingMessage
 from app.core.experiments.takeoff import Takeoff
 from app.simdrone import faults
-from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Sample
 from tests.vehicles.flying import Watcher, never

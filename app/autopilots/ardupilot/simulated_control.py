@@ -10,6 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.simulated.body import TICK_S, Body
+from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
 from app.core.control import ardupilot as loop
 from app.core.control.ardupilot_parameters import (
     ACCELERATION,
@@ -23,8 +25,6 @@ from app.core.control.ardupilot_parameters import (
 )
 from app.core.control.ardupilot_shaping import inverse_square_root
 from app.core.models.copter import accelerometer_filter
-from app.simdrone.body import TICK_S, Body
-from app.simdrone.copter_control import AltitudeController, Phase, SetPoint
 
 LOOP_HZ: Final = 1.0 / TICK_S
 HELD_ON_GROUND_S: Final = 2.0

@@ -13,12 +13,11 @@ from typing import ClassVar, Final
 
 from app.autopilots.dialects import COMMON
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
-from app.core.control import px4_parameters as loop
-from app.core.errors import InputError
-from app.simdrone.body import ACCEPTED, TEMPORARILY_REJECTED, Body, OutgoingMessage
-from app.simdrone.copter import Copter
-from app.simdrone.copter_control import Phase, SetPoint
-from app.simdrone.copter_parameters import (
+from app.autopilots.px4.simulated_control import Px4Controller
+from app.autopilots.simulated.body import ACCEPTED, TEMPORARILY_REJECTED, Body, OutgoingMessage
+from app.autopilots.simulated.copter import Copter, copter_kind
+from app.autopilots.simulated.copter_control import Phase, SetPoint
+from app.autopilots.simulated.copter_parameters import (
     BYTEWISE,
     Behaviour,
     FirmwareProfile,
@@ -28,8 +27,9 @@ from app.simdrone.copter_parameters import (
     Reaction,
     real,
 )
-from app.simdrone.copter_telemetry import HOME_AMSL_M
-from app.simdrone.px4_control import Px4Controller
+from app.autopilots.simulated.copter_telemetry import HOME_AMSL_M
+from app.core.control import px4_parameters as loop
+from app.core.errors import InputError
 
 _MANUAL: Final = 1 | 16 | 64
 _AUTO: Final = 1 | 4 | 8 | 16
@@ -283,3 +283,13 @@ class Px4(Copter):
 
     def idle_limit_s(self) -> float:
         return self.parameters["COM_DISARM_PRFLT"]
+
+
+_FAILSAFES: Final = {
+    "NAV_DLL_ACT": 3.0,  # land
+    "GF_ACTION": 5.0,  # land
+    "GF_MAX_VER_DIST": 10.0,
+    "COM_OBL_RC_ACT": 4.0,  # land without set points
+}
+
+KINDS: Final = (copter_kind("px4", "PX4", lambda body, system: Px4(body, system=system), _FAILSAFES),)

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, Self
 
 from app.autopilots.dialects import FieldValue, Message, is_known, number, text
-from app.simdrone import copter_telemetry
-from app.simdrone.body import (
+from app.autopilots.simulated import copter_telemetry
+from app.autopilots.simulated.body import (
     ACCEPTED,
     FAILED,
     TEMPORARILY_REJECTED,
@@ -14,11 +14,12 @@ from app.simdrone.body import (
     UNSUPPORTED,
     Body,
     OutgoingMessage,
+    SimulatedKind,
     Timetable,
     whole_ticks,
 )
-from app.simdrone.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
-from app.simdrone.copter_parameters import Behaviour, FirmwareProfile, FlightMode, Parameters, Reaction
+from app.autopilots.simulated.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
+from app.autopilots.simulated.copter_parameters import Behaviour, FirmwareProfile, FlightMode, Parameters, Reaction
 
 COMPONENT: Final = 1
 FORCE: Final = 21196
@@ -493,3 +494,17 @@ _COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
     REQUEST_MESSAGE: Copter._handle_request,
     REQUEST_CAPABILITIES: Copter._handle_capabilities,
 }
+
+
+def copter_kind(
+    name: str, title: str, make: Callable[[Body, int], Copter], failsafes: Mapping[str, float]
+) -> SimulatedKind:
+    """Return a kind of copter whose failsafes are these parameters."""
+
+    def set_up(body: Body, system: int) -> Copter:
+        copter = make(body, system)
+        for parameter, value in failsafes.items():
+            copter.parameters[parameter] = value
+        return copter
+
+    return SimulatedKind(name=name, title=title, system=1, link="udp:127.0.0.1:14550", make=make, set_up=set_up)

@@ -10,14 +10,12 @@ from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+from app.autopilots.ardupilot.simulated_control import LOOP_HZ, ArduPilotController
 from app.autopilots.dialects import ARDUPILOTMEGA, Message
-from app.core.control import ardupilot_parameters as loop
-from app.core.errors import InputError
-from app.simdrone.ardupilot_control import LOOP_HZ, ArduPilotController
-from app.simdrone.body import ACCEPTED, FAILED, Body, OutgoingMessage
-from app.simdrone.copter import Copter
-from app.simdrone.copter_control import SetPoint
-from app.simdrone.copter_parameters import (
+from app.autopilots.simulated.body import ACCEPTED, FAILED, Body, OutgoingMessage
+from app.autopilots.simulated.copter import Copter, copter_kind
+from app.autopilots.simulated.copter_control import SetPoint
+from app.autopilots.simulated.copter_parameters import (
     BY_VALUE,
     Behaviour,
     FirmwareProfile,
@@ -27,6 +25,8 @@ from app.simdrone.copter_parameters import (
     Reaction,
     real,
 )
+from app.core.control import ardupilot_parameters as loop
+from app.core.errors import InputError
 
 _MANUAL: Final = 1 | 16 | 64
 _GUIDED: Final = 1 | 8 | 16
@@ -209,3 +209,14 @@ class ArduPilot47(ArduPilot):
     )
     ground_station: ClassVar[str] = _GROUND_STATION_4_7
     integral_gain: ClassVar[str] = "PSC_D_ACC_I"
+
+
+_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0, "FENCE_ALT_MAX": 10.0}
+"""Land when the ground station is lost; stay inside the fence."""
+
+KINDS: Final = (
+    copter_kind("ardupilot", "ArduCopter up to 4.6", lambda body, system: ArduPilot(body, system=system), _FAILSAFES),
+    copter_kind(
+        "ardupilot-4.7", "ArduCopter from 4.7 on", lambda body, system: ArduPilot47(body, system=system), _FAILSAFES
+    ),
+)

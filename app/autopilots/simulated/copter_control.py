@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Final
 
 from app.autopilots.dialects import Message, number
-from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, throttle_command
+from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, throttle_command
 
 LOCAL_NED: Final = 1
 """MAV_FRAME."""

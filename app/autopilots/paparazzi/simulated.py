@@ -9,9 +9,26 @@ from collections.abc import Callable, Mapping
 from typing import Final, Self
 
 from app.autopilots.dialects import PAPARAZZI, FieldValue, Message, is_known, number, text
-from app.core.control.paparazzi import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
-from app.simdrone import paparazzi_telemetry
-from app.simdrone.body import (
+from app.autopilots.paparazzi import simulated_telemetry as paparazzi_telemetry
+from app.autopilots.paparazzi.simulated_estimator import FIX_S, FallEstimator
+from app.autopilots.paparazzi.simulated_plan import (
+    BLOCKS,
+    DESCENT_M_S,
+    GEO_INIT,
+    HOME_HEIGHT_M,
+    KILL_SETTING,
+    LANDED_AFTER_S,
+    MAX_DISTANCE_M,
+    NEWER_KILL_SETTING,
+    TAKEOFF,
+    WAYPOINTS,
+    Engine,
+    FlightPlan,
+    Settings,
+    Vertical,
+)
+from app.autopilots.paparazzi.simulated_telemetry import GROUND_MM
+from app.autopilots.simulated.body import (
     ACCEPTED,
     ARMED,
     FAILED,
@@ -21,28 +38,12 @@ from app.simdrone.body import (
     UNSUPPORTED,
     Body,
     OutgoingMessage,
+    SimulatedKind,
     Timetable,
-    vertical_command,
+    VerticalCommand,
     whole_ticks,
 )
-from app.simdrone.paparazzi_estimator import FIX_S, FallEstimator
-from app.simdrone.paparazzi_plan import (
-    BLOCKS,
-    DESCENT_M_S,
-    GEO_INIT,
-    HOME_HEIGHT_M,
-    KILL_SETTING,
-    LANDED_AFTER_S,
-    MAX_DISTANCE_M,
-    TAKEOFF,
-    WAYPOINTS,
-    Engine,
-    FlightPlan,
-    Settings,
-    Vertical,
-)
-from app.simdrone.paparazzi_telemetry import GROUND_MM
-from app.vehicles.kernels import Integers
+from app.core.control.paparazzi import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
 
 KILL: Final = 0
 FAILSAFE: Final = 1
@@ -261,7 +262,7 @@ class Paparazzi:
         """Return the speed towards HOME, slower over the last metres."""
         return min(max(self.north_m, -HOMING_M_S), HOMING_M_S)
 
-    def _command(self) -> Integers:
+    def _command(self) -> VerticalCommand:
         if not self.armed:
             return MOTORS_OFF
         if self.mode in _WITHOUT_PLAN:
@@ -274,13 +275,13 @@ class Paparazzi:
             case Vertical.DESCEND:
                 return self._descent()
 
-    def _without_plan(self) -> Integers:
+    def _without_plan(self) -> VerticalCommand:
         heights_m = {HOME: HOME_HEIGHT_M, BY_HAND: self._held_m}
         if self.mode in heights_m:
             return self._altitude(heights_m[self.mode])
         return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
 
-    def _descent(self) -> Integers:
+    def _descent(self) -> VerticalCommand:
         """Return the command to descend at a constant rate. On the ground the reference continues below the vehicle,
         which the replica's climb mode (of an older version) prevents, so that the thrust fades as in the recorded
         landings."""
@@ -291,13 +292,13 @@ class Paparazzi:
         sunk_m = DESCENT_M_S * (self.boot_s - self._touched_s + _REFERENCE_LAG_S)
         return self._altitude(self._touched_m - sunk_m)
 
-    def _altitude(self, target_m: float) -> Integers:
+    def _altitude(self, target_m: float) -> VerticalCommand:
         """Return the command to an altitude in the local frame, converted to the body's origin, the ground."""
         return self._vertical(ALT, fix(target_m, POSITION_BITS) - self._ground_counts)
 
-    def _vertical(self, mode: int, target: int) -> Integers:
+    def _vertical(self, mode: int, target: int) -> VerticalCommand:
         kp, ki, kd = (self._settings.count(f"gui_v_{name}") for name in ("kp", "ki", "kd"))
-        return vertical_command(mode, target, kp, ki, kd)
+        return VerticalCommand(mode, target, kp, ki, kd)
 
     def _watch_thrust(self) -> None:
         """Update whether it counts as flying: thrust above idle, or not, for a second."""
@@ -483,3 +484,26 @@ _HANDLERS: Final[Mapping[str, Callable[[Paparazzi, Message], None]]] = {
     "MISSION_ACK": Paparazzi._on_mission_ack,
     "MISSION_ITEM": Paparazzi._on_waypoint,
 }
+
+
+def _kind(name: str, title: str, make: Callable[[Body, int], Paparazzi]) -> SimulatedKind:
+    return SimulatedKind(name=name, title=title, system=31, link="udp:127.0.0.1:4244@4245", make=make, set_up=make)
+
+
+KINDS: Final = (
+    _kind(
+        "paparazzi",
+        "Paparazzi with a telemetry file for tuning",
+        lambda body, system: Paparazzi(body, system=system),
+    ),
+    _kind(
+        "paparazzi-bare",
+        "Paparazzi as built by default: position at 1.25 Hz",
+        lambda body, system: Paparazzi(body, system=system, tuned_telemetry=False),
+    ),
+    _kind(
+        "paparazzi-5.10",
+        "Paparazzi of 2017, in which the setting that stops the throttle has another name",
+        lambda body, system: Paparazzi(body, system=system, kill_setting=NEWER_KILL_SETTING),
+    ),
+)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.simdrone.body import ARMED, Fields
-from app.simdrone.copter_control import IGNORE_AZ, IGNORE_VZ, IGNORE_Z, LOCAL_NED, AltitudeController
+from app.autopilots.simulated.body import ARMED, Fields
+from app.autopilots.simulated.copter_control import IGNORE_AZ, IGNORE_VZ, IGNORE_Z, LOCAL_NED, AltitudeController
 
 LATITUDE_E7: Final = 473977420
 LONGITUDE_E7: Final = 85455940

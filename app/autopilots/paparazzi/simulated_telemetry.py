@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.simulated.body import ARMED, Fields
 from app.core.control.paparazzi import POSITION_BITS, SPEED_BITS
-from app.simdrone.body import ARMED, Fields
 
 PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(
     {
