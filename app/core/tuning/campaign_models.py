@@ -6,17 +6,21 @@ from typing import Final
 
 from app.core.definition import Flight
 from app.core.errors import InputError, TrajectoryError
+from app.core.experiments import EXPERIMENTS
+from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import Experiment, ModelledExperiment, ParameterDistribution, prior_distribution
+from app.core.experiments.copter_steps import CopterSteps
+from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.campaign_model import CampaignModel
 from app.core.tuning.copter_model import fit_copter_steps
 from app.core.tuning.vertical_model import fit_steps, fit_takeoff
 
 MODELS: Final[Mapping[str, Callable[[ModelledExperiment, Sequence[Flight]], CampaignModel]]] = MappingProxyType(
     {
-        "takeoff": fit_takeoff,
-        "altitude-steps": fit_steps,
-        "altitude-steps-ardupilot": fit_copter_steps,
-        "altitude-steps-px4": fit_copter_steps,
+        experiment.name: fit
+        for experiment in EXPERIMENTS.values()
+        for kind, fit in ((Takeoff, fit_takeoff), (AltitudeSteps, fit_steps), (CopterSteps, fit_copter_steps))
+        if isinstance(experiment, kind)
     }
 )
 """By the name of the experiment; at least one flight must be valid."""
