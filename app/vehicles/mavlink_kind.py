@@ -164,7 +164,7 @@ MAVLINK: Final = VehicleKind(
     "protocol.",
     is_real=True,
     can_fly=True,
-    experiments=tuple(name for profile in AUTOPILOTS.values() for name in profile.experiments),
+    experiments=tuple(dict.fromkeys(name for each in AUTOPILOTS.values() for name in each.experiments)),
     options=(
         VehicleOption("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", "", _DEFAULT.name, label="Kind of autopilot"),
         VehicleOption(
