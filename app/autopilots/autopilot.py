@@ -178,7 +178,7 @@ class Autopilot:
     """Settings that stop the motors, by their names in the releases; none if a command always does."""
     takeoff_parameter: str = ""
     """Parameter for the altitude of a takeoff; none if the command contains it."""
-    set_point_parameters: tuple[Setting, ...] = ()
+    set_point_settings: tuple[Setting, ...] = ()
     """Parameters required for a flight with several set points."""
 
     readers: mavlink.Readers

@@ -113,7 +113,7 @@ ARDUPILOT: Final = Autopilot(
     set_point_requirements=(
         Requirement("GUID_OPTIONS", "without bit 6 (targets flown by the position controller)", clear_bits=1 << 6),
     ),
-    set_point_parameters=(Setting("MOT_HOVER_LEARN", 0.0),),
+    set_point_settings=(Setting("MOT_HOVER_LEARN", 0.0),),
     readers=_READERS,
     telemetry=commands.COPTER_TELEMETRY,
     set_point_telemetry=(commands.ALTITUDE_ERROR, commands.FOLLOWED_TARGET, commands.DEMANDED_THROTTLE),

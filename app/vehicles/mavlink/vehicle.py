@@ -616,7 +616,7 @@ class MavlinkVehicle:
         """Return the parameters that the flight needs."""
         profile, target = self._radio.profile, self._radio.target
         settings = profile.take_off_settings(target)
-        return (*settings, *profile.set_point_settings(target)) if _flies_steps(order) else settings
+        return (*settings, *profile.set_point_settings) if _flies_steps(order) else settings
 
     def _prepare_set_points(self, order: FlightOptions) -> None:
         """Request the telemetry that a flight with several set points needs, and read the parameters of its loop, which
