@@ -1,1 +1,1 @@
-"""ArduCopter."""
+"""ArduPilot."""
