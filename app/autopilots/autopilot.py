@@ -12,6 +12,7 @@ from app.autopilots.gains import GainSet
 from app.autopilots.measurements import Measurement, VehicleEvent
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import GainlineError
+from app.core.experiments.base import Experiment
 
 ReferenceSource = Literal["replica", "error", "target"]
 """Source of an autopilot's own reference: the replica of its loop computes it; it sends its altitude error; it is the
@@ -104,7 +105,7 @@ class Autopilot:
 
     name: str
     title: str
-    experiments: tuple[str, ...]
+    experiments: tuple[Experiment, ...]
     """Experiments that tune its gains, the default first."""
     dialect: Dialect
     autopilot: int

@@ -7,11 +7,11 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from app import __version__
+from app.autopilots.experiments import EXPERIMENTS
 from app.autopilots.registry import AUTOPILOTS
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema
-from app.core.experiments import EXPERIMENTS
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Strategy
@@ -161,7 +161,10 @@ def get_catalogue() -> Catalogue:
         ],
         strategies=[_strategy(each) for each in STRATEGIES.values()],
         vehicle_kinds=[_kind(kind) for kind in VEHICLE_KINDS.values()],
-        autopilots=[AutopilotInfo.view_of(each) for each in AUTOPILOTS.values()],
+        autopilots=[
+            AutopilotInfo.view_of(each, experiments=[own.name for own in each.experiments])
+            for each in AUTOPILOTS.values()
+        ],
         presets=[preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
     )
 

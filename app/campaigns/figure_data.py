@@ -9,12 +9,12 @@ from typing import Final, Literal, cast
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, Scatter
 from app.core.records.flight_events import FlightEvent, flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory

@@ -138,7 +138,7 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
 
 def _experiments(options: Options) -> tuple[str, ...]:
     """Return the experiments whose gains the autopilot has."""
-    return AUTOPILOTS[str(options["autopilot"])].experiments
+    return tuple(each.name for each in AUTOPILOTS[str(options["autopilot"])].experiments)
 
 
 def _check_gains(options: Options, gains: Gains) -> None:
@@ -164,7 +164,7 @@ MAVLINK: Final = VehicleKind(
     "protocol.",
     is_real=True,
     can_fly=True,
-    experiments=tuple(dict.fromkeys(name for each in AUTOPILOTS.values() for name in each.experiments)),
+    experiments=tuple(dict.fromkeys(each.name for autopilot in AUTOPILOTS.values() for each in autopilot.experiments)),
     options=(
         VehicleOption("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", "", _DEFAULT.name, label="Kind of autopilot"),
         VehicleOption(

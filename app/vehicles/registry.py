@@ -32,7 +32,7 @@ IMPORT: Final = VehicleKind(
     line="You fly the proposed gains on your own vehicle and upload its log, or the altitude as CSV.",
     is_real=True,
     can_fly=False,
-    experiments=tuple(dict.fromkeys(each.experiments[0] for each in AUTOPILOTS.values())),
+    experiments=tuple(dict.fromkeys(each.experiments[0].name for each in AUTOPILOTS.values())),
     options=(),
     open=_open,
 )

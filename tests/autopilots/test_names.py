@@ -16,12 +16,12 @@ LEFT: Final = {
     # The replicas, and what is built of them: vertical.py and horizontal.py of each folder, once they move there.
     "app/core/analysis": 51,
     "app/core/control": 13,
-    "app/core/experiments": 56,
+    "app/core/experiments": 7,
     "app/core/models": 8,
     "app/core/tuning": 4,
     # Logs of one firmware, until they are read as recordings.
     "app/controller_checks": 53,
-    "app/log_analyses": 18,
+    "app/log_analyses": 14,
     "app/logs": 111,
     # The paper's loop, which the simulated vehicles and reproductions fly, and its command.
     "app/cli": 4,

@@ -28,7 +28,6 @@ from app.autopilots.measurements import (
 )
 from app.autopilots.registry import AUTOPILOTS
 from app.core.errors import GainsError
-from app.core.experiments import get_experiment
 from app.vehicles.mavlink.parameters import settings
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 
@@ -256,7 +255,7 @@ def test_gains_are_clamped_here_because_no_autopilot_does() -> None:
 
 @pytest.mark.parametrize("profile", AUTOPILOTS.values(), ids=AUTOPILOTS)
 def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_every_release(profile: Autopilot) -> None:
-    space = get_experiment(profile.experiments[0]).space
+    space = profile.experiments[0].space
     for gain_set in profile.gain_sets:
         for edge in (space.lower, space.default, space.upper):
             gains = space.mapping(edge)
@@ -266,7 +265,7 @@ def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_eve
 @pytest.mark.parametrize("profile", AUTOPILOTS.values(), ids=AUTOPILOTS)
 def test_the_gains_of_a_vehicle_have_the_order_of_its_experiment(profile: Autopilot) -> None:
     for gain_set in profile.gain_sets:
-        assert tuple(gain.gain for gain in gain_set) == get_experiment(profile.experiments[0]).space.names
+        assert tuple(gain.gain for gain in gain_set) == profile.experiments[0].space.names
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400])

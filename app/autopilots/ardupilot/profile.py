@@ -4,6 +4,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.autopilots import commands, mavlink
+from app.autopilots.ardupilot.experiments import EXPERIMENTS, GAINS
 from app.autopilots.autopilot import Autopilot, Requirement
 from app.autopilots.commands import Action, Setting, Step, Target
 from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
@@ -11,7 +12,6 @@ from app.autopilots.gains import on_board
 from app.autopilots.measurements import DISARMING, Measurement
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.control.ardupilot_parameters import LOOP_NAMES, NEWER_NAMES, UNSUPPORTED
-from app.core.experiments.takeoff import ARDUPILOT_GAINS
 
 GUIDED: Final = 4
 LAND: Final = 9
@@ -76,7 +76,7 @@ def _simulated() -> tuple[SimulatedKind, ...]:
 ARDUPILOT: Final = Autopilot(
     name="ardupilot",
     title="ArduCopter",
-    experiments=("takeoff-ardupilot", "altitude-steps-ardupilot"),
+    experiments=EXPERIMENTS,
     dialect=ARDUPILOTMEGA,
     autopilot=3,
     label="ArduCopter",
@@ -90,8 +90,8 @@ ARDUPILOT: Final = Autopilot(
     automatic_modes=frozenset({"3", "4", "6", "9", "17", "19", "20", "21", "23", "26", "27"}),
     mode_names=_MODE_NAMES,
     gain_sets=(
-        on_board(ARDUPILOT_GAINS, integrating=_INTEGRATING),
-        on_board(ARDUPILOT_GAINS, integrating=_INTEGRATING, names=_SINCE_4_7),
+        on_board(GAINS, integrating=_INTEGRATING),
+        on_board(GAINS, integrating=_INTEGRATING, names=_SINCE_4_7),
     ),
     loop_parameters=(LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in _RENAMED), *NEWER_NAMES)),
     may_lack=_MAY_LACK,

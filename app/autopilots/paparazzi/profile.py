@@ -12,6 +12,8 @@ from app.autopilots.dialects import Message, number, text
 from app.autopilots.gains import GainParameter
 from app.autopilots.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
 from app.autopilots.simulated.body import SimulatedKind
+from app.core.experiments.altitude_steps import AltitudeSteps
+from app.core.experiments.takeoff import Takeoff
 
 WAIT_GPS: Final = "Wait GPS"
 GEO_INIT: Final = "Geo init"
@@ -177,7 +179,7 @@ def _simulated() -> tuple[SimulatedKind, ...]:
 PAPARAZZI: Final = Autopilot(
     name="paparazzi",
     title="Paparazzi",
-    experiments=("takeoff", "altitude-steps"),
+    experiments=(Takeoff(), AltitudeSteps()),
     dialect=DIALECT,
     autopilot=9,
     label="Paparazzi (AR.Drone 2)",

@@ -12,6 +12,7 @@ from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import on_board
 from app.autopilots.measurements import DISARMING, Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
+from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.control.px4_parameters import (
     ESTIMATOR_NAMES,
@@ -22,7 +23,6 @@ from app.core.control.px4_parameters import (
     hover_limits,
 )
 from app.core.errors import InputError
-from app.core.experiments.takeoff import PX4_GAINS
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
@@ -125,7 +125,7 @@ def _simulated() -> tuple[SimulatedKind, ...]:
 PX4: Final = Autopilot(
     name="px4",
     title="PX4",
-    experiments=("takeoff-px4", "altitude-steps-px4"),
+    experiments=EXPERIMENTS,
     dialect=COMMON,
     autopilot=12,
     label="PX4",
@@ -139,7 +139,7 @@ PX4: Final = Autopilot(
     landing_modes=frozenset({f"{_AUTO}.{_LAND}"}),
     automatic_modes=_AUTOMATIC_MODES,
     mode_names=_MODE_NAMES,
-    gain_sets=(on_board(PX4_GAINS, integrating="MPC_Z_VEL_I_ACC"),),
+    gain_sets=(on_board(GAINS, integrating="MPC_Z_VEL_I_ACC"),),
     loop_parameters=(LOOP_NAMES,),
     may_lack=frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME}),
     hover_limits=_hover_limits,

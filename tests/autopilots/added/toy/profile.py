@@ -9,6 +9,7 @@ from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import GainParameter
 from app.autopilots.measurements import DISARMING, Measurement
 from app.autopilots.simulated.body import SimulatedKind
+from app.core.experiments.takeoff import Takeoff
 
 MAKE: Final = 16
 MANUAL, AUTO, LAND = 1, 2, 3
@@ -48,7 +49,7 @@ TOY: Final = Autopilot(
     name="toy",
     title="Toy",
     label="Toy",
-    experiments=("takeoff",),
+    experiments=(Takeoff(),),
     dialect=COMMON,
     autopilot=MAKE,
     recordings="none",
