@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from app.autopilots.dialects import Codec
-from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, OutgoingMessage, SimulatedAutopilot
+from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, OutgoingMessage, SimulatedAutopilot
 from app.core.clock import Clock
-from app.simdrone.body import Body
 from app.simdrone.faults import Faults, PlannedFault
 from app.simdrone.motion_capture import MocapOutput, MotionCapture
 from app.vehicles.mavlink.transports import Peer, Transport

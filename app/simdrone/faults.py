@@ -8,10 +8,9 @@ from types import MappingProxyType
 from typing import ClassVar, Final, Protocol
 
 from app.autopilots.dialects import FieldValue
-from app.autopilots.simulated.body import TICK_S, Fields, OutgoingMessage, SimulatedAutopilot
+from app.autopilots.simulated.body import TICK_S, Body, Fields, OutgoingMessage, SimulatedAutopilot
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
-from app.simdrone.body import Body
 from app.simdrone.motion_capture import MotionCapture
 
 CONNECT: Final = "connect"

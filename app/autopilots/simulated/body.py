@@ -1,4 +1,6 @@
-"""The body that simulated autopilots fly, as they see it, what they are to their drone, and their kinds."""
+"""The body of a simulated drone, which persists between flights and falls if its motors stop in the air, and the
+interface and kinds of the autopilots that fly it.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,6 +12,9 @@ from app.core.control.paparazzi import RATE_HZ, THROTTLE
 TICK_STEPS: Final = 2
 """Steps of the simulation between two updates of the autopilot's radio, timers and flight plan."""
 TICK_S: Final = TICK_STEPS / RATE_HZ
+FULL_BATTERY_V: Final = 11.1
+_STANDS_BELOW_M: Final = 0.03
+_STANDS_BELOW_M_S: Final = 0.1
 
 _FULL_COMMAND: Final = 9600
 
@@ -32,40 +37,79 @@ def throttle_command(share: float) -> VerticalCommand:
     return VerticalCommand(THROTTLE, round(min(max(share, 0.0), 1.0) * _FULL_COMMAND))
 
 
-class Body(Protocol):
-    """A vehicle between power-on and power-off. Altitude is above the ground at its place."""
+class Flight(Protocol):
+    """A simulation of the body from its first thrust on."""
 
-    altitude_m: float
-    climb_rate_m_s: float
-    thrust: float
-    battery_v: float
-    north_m: float
-    """Position relative to the place where it was switched on."""
-    steered_m_s: float
-    """Speed north by its autopilot, while it is off the ground."""
-    motors_dead: bool
-    """Fault: the motors do not turn."""
+    def advance(self, steps: int, command: VerticalCommand) -> tuple[float, float, float, float]:
+        """Return its altitude, m, climb rate, m/s, thrust and battery voltage after `steps` steps of 1/512 s."""
+        ...
+
+    def forget_error_sum(self) -> None: ...
+
+
+Launch = Callable[[int], Flight]
+"""Creates a flight, standing on the ground, from its seed."""
+
+
+class Body:
+    """The vehicle between power-on and power-off. Altitude is above the ground at its place.
+
+    A flight begins with the first thrust and ends when the motors are off on the ground; the seed is incremented for
+    every flight. Between flights nothing is computed.
+    """
+
+    def __init__(self, launch: Launch, *, seed: int) -> None:
+        self._launch = launch
+        self._seed = seed
+        self._flight: Flight | None = None
+        self.altitude_m = 0.0
+        self.climb_rate_m_s = 0.0
+        self.thrust = 0.0
+        self.battery_v = FULL_BATTERY_V
+        self.north_m = 0.0
+        """Position relative to the place where it was switched on."""
+        self.steered_m_s = self.wind_m_s = 0.0
+        """Speeds north, by its autopilot and by the wind, while it is off the ground."""
+        self.motors_dead = False
+        """Fault: the motors do not turn."""
 
     @property
     def is_resting(self) -> bool:
         """Whether it is on the ground with its motors off."""
-        ...
+        return self._flight is None
 
     @property
     def stands(self) -> bool:
         """Whether it is on the ground, by height and speed."""
-        ...
+        return abs(self.altitude_m) < _STANDS_BELOW_M and abs(self.climb_rate_m_s) < _STANDS_BELOW_M_S
 
     @property
-    def north_m_s(self) -> float: ...
+    def north_m_s(self) -> float:
+        return 0.0 if self.is_resting or self.stands else self.steered_m_s + self.wind_m_s
 
     def advance(self, steps: int, command: VerticalCommand) -> None:
-        """Advance by `steps` steps of 1/512 s under `command`."""
-        ...
+        """Advance by `steps` steps of 1/512 s under `command`. Raises GainlineError if the simulation diverged."""
+        if self.motors_dead:
+            command = MOTORS_OFF
+        wants_to_rest = command.mode == THROTTLE and command.target == 0
+        if wants_to_rest and (self._flight is None or self.stands):
+            self._rest()
+            return
+        if self._flight is None:
+            self._flight = self._launch(self._seed)
+            self._seed += 1
+        self.altitude_m, self.climb_rate_m_s, self.thrust, self.battery_v = self._flight.advance(steps, command)
+        self.north_m += self.north_m_s * steps / RATE_HZ
 
     def forget_error_sum(self) -> None:
         """Empty the vertical loop's integrator."""
-        ...
+        if self._flight is not None:
+            self._flight.forget_error_sum()
+
+    def _rest(self) -> None:
+        self._flight = None
+        self.altitude_m = self.climb_rate_m_s = self.thrust = 0.0
+        self.battery_v = FULL_BATTERY_V
 
 
 Fields = Mapping[str, FieldValue]
