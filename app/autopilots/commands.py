@@ -7,37 +7,20 @@ from enum import StrEnum
 from typing import Final
 
 from app.autopilots.dialects import FieldValue
-from app.autopilots.measurements import Measurement
+from app.autopilots.measurements import DISARMING, Measurement
 
-ARM_DISARM: Final = 400
-SET_MODE: Final = 176
-_SET_MESSAGE_INTERVAL: Final = 511
-_REQUEST_MESSAGE: Final = 512
-_AUTOPILOT_VERSION: Final = 148
-FORCED: Final = 21196.0
+_ARM_DISARM: Final = 400
+_FORCED: Final = 21196.0
 """The second parameter of 400 that stops motors in the air."""
-CUSTOM_MODE: Final = 1.0
-"""MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, the first parameter of 176."""
-REAL32: Final = 9
+_REAL32: Final = 9
 TARGET: Final = "position target"
 """`Step.awaits` of a step that ends when the vehicle reports the position target of the step."""
-POSITION_ALONE: Final = 0b110111111000
+_POSITION_ALONE: Final = 0b110111111000
 """POSITION_TARGET_TYPEMASK: everything but the position is ignored."""
-WITH_ACCELERATION: Final = POSITION_ALONE & ~(1 << 8)
+_WITH_ACCELERATION: Final = _POSITION_ALONE & ~(1 << 8)
 """Position and vertical acceleration: bits 6 and 7 go on ignoring the horizontal ones."""
 _LOCAL_NED: Final = 1
-_SYS_STATUS: Final = 1
-_ATTITUDE: Final = 30
-_LOCAL_POSITION_NED: Final = 32
-_NAV_CONTROLLER_OUTPUT: Final = 62
-_VFR_HUD: Final = 74
-_ATTITUDE_TARGET: Final = 83
-_POSITION_TARGET_LOCAL_NED: Final = 85
-_FENCE_STATUS: Final = 162
-_EXTENDED_SYS_STATE: Final = 245
-_STATUS_HZ: Final = 4.0
-_FAST_HZ: Final = 10.0
-REFERENCE_HZ: Final = 50.0
+_REFERENCE_HZ: Final = 50.0
 """Rate of what is compared with the altitude, sample by sample."""
 SET_POINT_ATTEMPTS: Final = 3
 """Sendings of a set point; together shorter than the time between two set points."""
@@ -131,43 +114,42 @@ class MessageRequest:
     def step(self, target: Target, positions_hz: float = math.nan) -> Step:
         """Return the step that sends the request."""
         interval_us = round(1e6 / (self.rate_hz or positions_hz))
-        request = command(target, _SET_MESSAGE_INTERVAL, self.message, interval_us)
+        request = command(target, 511, self.message, interval_us)
         return Step((request,), awaits="command 511", attempts=5 if self.needed else 2, needed=self.needed)
+
+
+COPTER_TELEMETRY: Final = (
+    MessageRequest(32),  # LOCAL_POSITION_NED
+    MessageRequest(1, 4.0),  # SYS_STATUS
+    MessageRequest(245, 4.0, needed=False),  # EXTENDED_SYS_STATE
+    MessageRequest(162, 4.0, needed=False),  # FENCE_STATUS
+    MessageRequest(74, 10.0, needed=False),  # VFR_HUD
+    MessageRequest(30, 10.0, needed=False),  # ATTITUDE
+)
+"""All that a trial uses of an autopilot that sends only heartbeats unrequested, positions at the vehicle's rate."""
+ALTITUDE_ERROR: Final = MessageRequest(62, _REFERENCE_HZ)
+"""NAV_CONTROLLER_OUTPUT."""
+DEMANDED_THROTTLE: Final = MessageRequest(83, _REFERENCE_HZ)
+"""ATTITUDE_TARGET."""
+FOLLOWED_TARGET: Final = MessageRequest(85, _REFERENCE_HZ)
+"""POSITION_TARGET_LOCAL_NED, the position target that it follows."""
 
 
 def list_parameters(target: Target) -> Outgoing:
     return Outgoing("PARAM_REQUEST_LIST", {"target_system": target.aircraft, "target_component": 0})
 
 
-def read_parameter(target: Target, parameter: str) -> Outgoing:
+def read_parameter(target: Target, parameter: str, place: int = -1) -> Outgoing:
     return Outgoing(
         "PARAM_REQUEST_READ",
-        {"target_system": target.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
+        {"target_system": target.aircraft, "target_component": 0, "param_id": parameter, "param_index": place},
     )
 
 
 def read_place(target: Target, place: int) -> Outgoing:
     """Return a request for the parameter at a place in the vehicle's list, which must not be past its end, because
     Paparazzi reads beyond its table."""
-    return Outgoing(
-        "PARAM_REQUEST_READ",
-        {"target_system": target.aircraft, "target_component": 0, "param_id": "", "param_index": place},
-    )
-
-
-COPTER_TELEMETRY: Final = (
-    MessageRequest(_LOCAL_POSITION_NED),
-    MessageRequest(_SYS_STATUS, _STATUS_HZ),
-    MessageRequest(_EXTENDED_SYS_STATE, _STATUS_HZ, needed=False),
-    MessageRequest(_FENCE_STATUS, _STATUS_HZ, needed=False),
-    MessageRequest(_VFR_HUD, _FAST_HZ, needed=False),
-    MessageRequest(_ATTITUDE, _FAST_HZ, needed=False),
-)
-"""All that a trial uses of an autopilot that sends only heartbeats unrequested, positions at the vehicle's rate."""
-ALTITUDE_ERROR: Final = MessageRequest(_NAV_CONTROLLER_OUTPUT, REFERENCE_HZ)
-DEMANDED_THROTTLE: Final = MessageRequest(_ATTITUDE_TARGET, REFERENCE_HZ)
-FOLLOWED_TARGET: Final = MessageRequest(_POSITION_TARGET_LOCAL_NED, REFERENCE_HZ)
-"""The position target that it follows."""
+    return read_parameter(target, "", place)
 
 
 def command(target: Target, code: int, *parameters: float) -> Outgoing:
@@ -187,12 +169,12 @@ def command(target: Target, code: int, *parameters: float) -> Outgoing:
 
 def set_mode(target: Target, *mode: float) -> Outgoing:
     """Return the command to enter a custom mode, with its submode if there is one."""
-    return command(target, SET_MODE, CUSTOM_MODE, *mode)
+    return command(target, 176, 1.0, *mode)
 
 
 def request_version(target: Target) -> Outgoing:
     """Return a request for one AUTOPILOT_VERSION."""
-    return command(target, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
+    return command(target, 512, 148)
 
 
 def set_parameter(target: Target, parameter: str, value: float, *, component: int) -> Outgoing:
@@ -204,14 +186,14 @@ def set_parameter(target: Target, parameter: str, value: float, *, component: in
             "target_component": component,
             "param_id": parameter,
             "param_value": value,
-            "param_type": REAL32,
+            "param_type": _REAL32,
         },
     )
 
 
 def disarm(target: Target, *, forced: bool = False) -> Outgoing:
     """Return the command to disarm; `forced` also in flight, where an autopilot would refuse it."""
-    return command(target, ARM_DISARM, 0.0, FORCED if forced else 0.0)
+    return command(target, _ARM_DISARM, 0.0, _FORCED if forced else 0.0)
 
 
 def position_target(target: Target) -> Outgoing:
@@ -225,7 +207,7 @@ def position_target(target: Target) -> Outgoing:
             "target_system": target.aircraft,
             "target_component": target.component,
             "coordinate_frame": _LOCAL_NED,
-            "type_mask": WITH_ACCELERATION if target.acceleration_m_s2 else POSITION_ALONE,
+            "type_mask": _WITH_ACCELERATION if target.acceleration_m_s2 else _POSITION_ALONE,
             "x": target.north_m,
             "y": target.east_m,
             "z": -target.altitude_m,
@@ -239,3 +221,17 @@ def follow_target(target: Target) -> Step:
     """Return the step that sends a position target until the vehicle reports it."""
     sends = (position_target(target),)
     return Step(sends, awaits=TARGET, attempts=SET_POINT_ATTEMPTS, altitude_m=target.altitude_m)
+
+
+def copter_steps(action: Action, target: Target, *land: float) -> tuple[Step, ...]:
+    """Return the steps of an autopilot that flies by modes, of which `land` is that of a landing: to arm in the mode
+    that it is in, to fly to a position target, to land, and to stop the motors."""
+    match action:
+        case Action.ARM:
+            return (Step((command(target, _ARM_DISARM, 1.0),), awaits=DISARMING),)
+        case Action.LAND:
+            return (Step((set_mode(target, *land),)),)
+        case Action.MOTORS_OFF | Action.KILL:
+            return (Step((disarm(target, forced=action is Action.KILL),)),)
+        case _:
+            return (follow_target(target),)

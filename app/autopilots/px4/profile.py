@@ -10,7 +10,7 @@ from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, R
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import on_board
-from app.autopilots.measurements import DISARMING, Measurement, Parameter, VehicleEvent
+from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
 from app.autopilots.simulated.body import SimulatedKind
@@ -69,8 +69,6 @@ def _make_armable(target: Target, mode: str, *, may_arm: bool | None) -> tuple[S
 
 def _steps(action: Action, target: Target) -> tuple[Step, ...]:
     match action:
-        case Action.ARM:
-            return (Step((commands.command(target, commands.ARM_DISARM, 1.0),), awaits=DISARMING),)
         case Action.TAKE_OFF:
             return (Step((commands.set_mode(target, _AUTO, _TAKE_OFF),), awaits="command 176", attempts=1),)
         case Action.HOLD:
@@ -81,12 +79,8 @@ def _steps(action: Action, target: Target) -> tuple[Step, ...]:
                 Step((), awaits=entered),
                 commands.follow_target(target),
             )
-        case Action.FLY_TO:
-            return (commands.follow_target(target),)
-        case Action.LAND:
-            return (Step((commands.set_mode(target, _AUTO, _LAND),)),)
-        case Action.MOTORS_OFF | Action.KILL:
-            return (Step((commands.disarm(target, forced=action is Action.KILL),)),)
+        case _:
+            return commands.copter_steps(action, target, _AUTO, _LAND)
 
 
 def _parameter(message: Message) -> Parameter:

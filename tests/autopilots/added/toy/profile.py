@@ -7,7 +7,7 @@ from app.autopilots.autopilot import Autopilot
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import GainParameter
-from app.autopilots.measurements import DISARMING, Measurement
+from app.autopilots.measurements import Measurement
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.experiments.takeoff import Takeoff
 
@@ -22,21 +22,11 @@ def _heartbeat(message: Message) -> Measurement | None:
 
 
 def _steps(action: Action, target: Target) -> tuple[Step, ...]:
-    match action:
-        case Action.ARM:
-            return (
-                Step((commands.set_mode(target, AUTO),), awaits="command 176"),
-                Step((commands.command(target, commands.ARM_DISARM, 1.0),), awaits=DISARMING),
-            )
-        case Action.TAKE_OFF:
-            above = commands.command(target, 22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, target.altitude_m)
-            return (Step((above,), awaits="command 22", attempts=1),)
-        case Action.HOLD | Action.FLY_TO:
-            return (commands.follow_target(target),)
-        case Action.LAND:
-            return (Step((commands.set_mode(target, LAND),)),)
-        case Action.MOTORS_OFF | Action.KILL:
-            return (Step((commands.disarm(target, forced=action is Action.KILL),)),)
+    if action is Action.TAKE_OFF:
+        above = commands.command(target, 22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, target.altitude_m)
+        return (Step((above,), awaits="command 22", attempts=1),)
+    steps = commands.copter_steps(action, target, LAND)
+    return (Step((commands.set_mode(target, AUTO),), awaits="command 176"), *steps) if action is Action.ARM else steps
 
 
 def _simulated() -> tuple[SimulatedKind, ...]:
