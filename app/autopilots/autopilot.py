@@ -90,7 +90,7 @@ class MakeArmable(Protocol):
     """Returns the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
     None if nothing."""
 
-    def __call__(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]: ...
+    def __call__(self, target: Target, mode: str, /, *, may_arm: bool | None) -> tuple[Step, ...]: ...
 
 
 def _arms_in_any_mode(_target: Target, _mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG001

@@ -16,7 +16,7 @@ from app.core.tuning.vertical_model import fit_steps, fit_takeoff
 
 Fit = Callable[[ModelledExperiment, Sequence[Flight]], CampaignModel]
 
-FITS: Final[Mapping[type[ModelledExperiment], Fit]] = MappingProxyType(
+FITS: Final[Mapping[type[object], Fit]] = MappingProxyType(
     {Takeoff: fit_takeoff, AltitudeSteps: fit_steps, CopterSteps: fit_copter_steps}
 )
 """By the kind of experiment; at least one flight must be valid."""

@@ -112,7 +112,7 @@ class Strategy:
     propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
     predict_errors: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
     predict_flight: Callable[[Definition, ModelledExperiment, Sequence[Flight]], PredictionOf]
-    kinds: tuple[type[ModelledExperiment], ...] = ()
+    kinds: tuple[type[object], ...] = ()
     corrects_model: bool = True
     needs_model: bool = True
 

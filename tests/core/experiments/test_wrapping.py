@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import vertical_loop_hazards
 from app.core.control.paparazzi import (
     ALT,
     ERROR_SUM_MAX,
@@ -15,6 +14,7 @@ from app.core.control.paparazzi import (
     step,
     wrap32,
 )
+from app.core.experiments import vertical_loop_hazards
 from app.core.experiments.base import Check
 from app.core.experiments.vertical_loop_hazards import PRODUCTS, check_wrapping
 from tests.core.tuning.flying import TAKEOFF, compiled_only

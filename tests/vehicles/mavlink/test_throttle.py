@@ -22,7 +22,7 @@ from tests.vehicles.mavlink.replaying import FLOWN, messages
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 from tests.vehicles.mavlink.test_connected import connected
 
-AUTOPILOTS = sorted(AUTOPILOTS)
+NAMES = sorted(AUTOPILOTS)
 FLOWN_ON = ["paparazzi", *(pytest.param(other, marks=pytest.mark.complete) for other in ("ardupilot", "px4"))]
 """The everyday ring flies one of them."""
 ORDER = FlightOptions(seed=1, window_s=12.0)
@@ -41,7 +41,7 @@ def measured(profile: Autopilot, kind: str, **fields: FieldValue) -> Measurement
     return profile.measure(message)
 
 
-@pytest.mark.parametrize("autopilot", AUTOPILOTS)
+@pytest.mark.parametrize("autopilot", NAMES)
 @pytest.mark.parametrize(("percent", "share"), [(0, 0.0), (62, 0.62), (100, 1.0), (101, None), (0xFFFF, None)], ids=str)
 def test_percent_become_a_share_of_full_and_nothing_beyond(autopilot: str, percent: int, share: float | None) -> None:
     found = measured(AUTOPILOTS[autopilot], "VFR_HUD", **HUD, throttle=percent)
