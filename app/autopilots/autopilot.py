@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal, Protocol
+from typing import Final, Literal
 
 from app.autopilots import commands, mavlink
 from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
@@ -84,17 +84,6 @@ class ChecksRequest:
 
     command: int
     last: int
-
-
-class MakeArmable(Protocol):
-    """Returns the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
-    None if nothing."""
-
-    def __call__(self, target: Target, mode: str, /, *, may_arm: bool | None) -> tuple[Step, ...]: ...
-
-
-def _arms_in_any_mode(_target: Target, _mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG001
-    return ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -200,7 +189,9 @@ class Autopilot:
     """Whether it must hold its first set point by position targets (`Action.HOLD`) before it flies to others."""
     needs_stream: bool = False
     """Whether it must receive its position target all the time while it follows set points."""
-    make_armable: MakeArmable = _arms_in_any_mode
+    armable_mode: tuple[float, ...] = ()
+    """Mode, by its parameters of a command, that it must be switched to from all automatic ones but `hovering_modes`,
+    and from a pilot's mode in which it reports that it does not arm; none if arming begins with its mode."""
     explore: Callable[[Ask, Target], Mapping[str, int]] = lambda _ask, _target: {}
     """Returns the blocks of the flight plan, if there is one. Raises AutopilotError if a required one is missing."""
     conclude: Callable[[Target], tuple[Outgoing, ...]] = lambda _target: ()
@@ -222,6 +213,13 @@ class Autopilot:
     def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
         """Return the steps that request the further telemetry of a flight with several set points."""
         return tuple(each.step(target) for each in self.set_point_telemetry)
+
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+        """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
+        None if nothing."""
+        leaves = mode not in self.hovering_modes if mode in self.automatic_modes else may_arm is False
+        step = Step((commands.set_mode(target, *self.armable_mode),), awaits="command 176", needed=False)
+        return (step,) if self.armable_mode and leaves else ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
         """Return the parameters required for a takeoff to the altitude of `target`."""

@@ -35,7 +35,6 @@ _LAND: Final = 6
 _OFFBOARD: Final = 6
 _TERMINATION: Final = 10
 _HOVERING_MODES: Final = frozenset({f"{_AUTO}.{_LOITER}"})
-_AUTOMATIC_MODES: Final = frozenset(f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256))
 _MODE_NAMES: Final = MappingProxyType(
     {
         "1.0": "Manual", "2.0": "Altitude", "3.0": "Position", "4.1": "Ready", "4.2": "Takeoff", "4.3": "Hold",
@@ -56,15 +55,6 @@ def _hover_limits(parameters: Mapping[str, float]) -> tuple[float, float] | None
         return None if assumed is None else hover_limits(assumed, hover_deviation(parameters))
     except InputError as error:
         raise AutopilotError(str(error), hint=f"Correct {HOVER_RANGE_NAME} on the vehicle, then try again.") from error
-
-
-def _make_armable(target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
-    """Switch to hold from all other automatic modes: in most it does not arm, and in that of the takeoff it takes off
-    as soon as it is armed; and from a pilot's mode in which it reports that it does not arm. It returns to the last
-    mode when it disarms, and stays in the landing mode if Land arrives after that."""
-    leaves = mode not in _HOVERING_MODES if mode in _AUTOMATIC_MODES else may_arm is False
-    hold = commands.set_mode(target, _AUTO, _LOITER)
-    return (Step((hold,), awaits="command 176", needed=False),) if leaves else ()
 
 
 def _steps(action: Action, target: Target) -> tuple[Step, ...]:
@@ -131,7 +121,7 @@ PX4: Final = Autopilot(
     following_modes=frozenset({f"{_OFFBOARD}.0"}),
     hovering_modes=_HOVERING_MODES,
     landing_modes=frozenset({f"{_AUTO}.{_LAND}"}),
-    automatic_modes=_AUTOMATIC_MODES,
+    automatic_modes=frozenset(f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256)),
     mode_names=_MODE_NAMES,
     gain_sets=(on_board(GAINS, integrating="MPC_Z_VEL_I_ACC"),),
     loop_parameters=(LOOP_NAMES,),
@@ -159,6 +149,8 @@ PX4: Final = Autopilot(
     steps=_steps,
     simulated=_simulated,
     needs_stream=True,
-    make_armable=_make_armable,
+    armable_mode=(_AUTO, _LOITER),
 )
-"""Integer parameters are encoded bytewise in a float."""
+"""Integer parameters are encoded bytewise in a float. In most automatic modes it does not arm, and in that of the
+takeoff it takes off as soon as it is armed. It returns to the last mode when it disarms, and stays in the landing mode
+if Land arrives after that."""
