@@ -26,7 +26,7 @@ from app.campaigns.trials.schemas import Classification, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
-from app.core.tuning.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import predict_points
 from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registration
@@ -40,6 +40,7 @@ from app.reproductions.registry import get_reproduction
 from app.vehicles.base import FlightOptions, StopRequest
 from app.vehicles.registry import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
+from tests.core.tuning.defined import plan_grid
 
 T = TypeVar("T")
 Json = dict[str, Any]

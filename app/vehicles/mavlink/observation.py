@@ -9,6 +9,17 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from app.autopilots.measurements import (
+    Attitude,
+    Battery,
+    BlockEntered,
+    FenceBreach,
+    Heartbeat,
+    InvalidPosition,
+    LandedState,
+    Measurement,
+    Position,
+)
 from app.vehicles.mavlink.boot_clock import (
     AHEAD_S,
     BACK_S,
@@ -19,18 +30,7 @@ from app.vehicles.mavlink.boot_clock import (
     may_have_begun,
     unwrapped,
 )
-from app.vehicles.mavlink.events import (
-    Attitude,
-    Battery,
-    BlockEntered,
-    FenceBreach,
-    Heartbeat,
-    InvalidPosition,
-    LandedState,
-    Measurement,
-    Position,
-    SecondaryAltitudeReceived,
-)
+from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import GROUND_M, Limits
 from app.vehicles.mavlink.states import replace
 

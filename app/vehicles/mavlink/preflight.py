@@ -9,6 +9,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
+from app.autopilots import commands
+from app.autopilots.autopilot import Requirement
+from app.autopilots.commands import Step
+from app.autopilots.measurements import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
+from app.autopilots.registry import AUTOPILOTS
 from app.core.control.px4_parameters import HOVER_THRUSTS
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
 from app.core.models.set_points import SetPoints
@@ -22,13 +27,9 @@ from app.vehicles.base import (
     VehicleError,
 )
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
-from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.boot_clock import unwrapped
-from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.profiles import PROFILES, base
-from app.vehicles.mavlink.profiles.base import Requirement, Step
 from app.vehicles.mavlink.radio import AutopilotLink
 
 HEARTBEAT_S: Final = 5.0
@@ -147,7 +148,7 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
 
 def _named(makes: Iterable[int]) -> str:
     """The autopilots with these MAV_AUTOPILOT."""
-    titles = {profile.autopilot: profile.title for profile in PROFILES.values()}
+    titles = {profile.autopilot: profile.title for profile in AUTOPILOTS.values()}
     names = " and ".join(titles.get(make, f"another autopilot ({make})") for make in sorted(makes))
     return names[:1].upper() + names[1:]
 
@@ -171,7 +172,7 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     string."""
     problem = ""
     try:
-        radio.target = replace(radio.target, blocks=radio.profile.explore(radio.request, radio.target))
+        radio.target = replace(radio.target, blocks=radio.explore())
     except VehicleError as error:
         problem = str(error)
     radio.send(*radio.profile.conclude(radio.target))
@@ -206,7 +207,9 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
     if radio.target.stop_settings or not radio.profile.stop_settings or radio.link.duplicate_reason:
         return
     if watched.stands:
-        reply = radio.request(base.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
+        reply = radio.request(
+            commands.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING
+        )
         accepted = isinstance(reply, CommandReply) and reply.accepted
         radio.target = replace(radio.target, stops_by_command=accepted)
 
@@ -534,11 +537,11 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
 
 def _request_checks(radio: AutopilotLink) -> None:
     """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
-    request = radio.profile.checks_request(radio.target)
-    if request is not None:
+    checks, request = radio.profile.checks, radio.profile.checks_request(radio.target)
+    if checks is not None and request is not None:
         radio.request(
             request,
-            lambda reply: isinstance(reply, VehicleEvent) and reply.number == HEALTH_SUMMARY,
+            lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
             attempts=_CHECKS_ATTEMPTS,
         )
 

@@ -6,11 +6,12 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.commands import Action, Outgoing, Target, read_parameter
+from app.autopilots.measurements import Position
 from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     AbortRequested,
-    Action,
     ActionRefused,
     Command,
     DuplicateVehicleDetected,
@@ -19,7 +20,6 @@ from app.vehicles.mavlink.events import (
     MotorsOffRequested,
     PacketReceived,
     PerformAction,
-    Position,
     RecordSample,
     RequestGain,
     RestoreGains,
@@ -32,7 +32,6 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.profiles.base import Outgoing, Target
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
@@ -225,7 +224,7 @@ class TrialRunner:
                     radio = self._radio
                     radio.send(radio.profile.set_parameter(radio.target, setting.parameter, setting.value))
                 case RequestGain(parameter):
-                    self._radio.send(self._radio.profile.read_parameter(self._radio.target, parameter))
+                    self._radio.send(read_parameter(self._radio.target, parameter))
                 case RestoreGains():
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():

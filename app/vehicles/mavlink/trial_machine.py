@@ -8,24 +8,21 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Heartbeat, Measurement, Parameter, Position
 from app.vehicles.mavlink import limit_checks, set_point_schedule
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     AbortRequested,
-    Action,
     ActionDone,
     ActionRefused,
     Command,
     DuplicateVehicleDetected,
     Event,
     GainsRestored,
-    Heartbeat,
-    Measurement,
     MotorsOffRequested,
     PacketReceived,
-    Parameter,
     PerformAction,
-    Position,
     RecordSample,
     RequestGain,
     RestoreGains,

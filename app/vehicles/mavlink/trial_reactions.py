@@ -10,23 +10,14 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Final, Literal
 
+from app.autopilots.autopilot import ModeParameter
+from app.autopilots.commands import Action, Setting
+from app.autopilots.measurements import Parameter, Position
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import RECORDED_BEYOND_S, motors_off_requested
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import (
-    Action,
-    Command,
-    Event,
-    ModeParameter,
-    PacketReceived,
-    Parameter,
-    PerformAction,
-    Position,
-    RequestGain,
-    SendGain,
-    Setting,
-)
+from app.vehicles.mavlink.events import Command, Event, PacketReceived, PerformAction, RequestGain, SendGain
 from app.vehicles.mavlink.failures import (
     GAIN_FAILURES,
     GROUND_M,

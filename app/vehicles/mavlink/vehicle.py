@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.commands import Action, Setting
 from app.core.clock import Clock
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
@@ -29,7 +30,7 @@ from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight,
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
-from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample, Setting
+from app.vehicles.mavlink.events import PacketReceived, RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference, with_flown_set_points
 from app.vehicles.mavlink.opening import limits_of, open_radio
@@ -574,7 +575,7 @@ class MavlinkVehicle:
         if self._radio.profile.flying_blocks:
             plan_time_s = float(self._options["plan_time_s"])
             items = (*items, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
-        hover = preflight.evaluate_hover(self._hover_throttle, self._radio.profile.hover_limits(self._loop))
+        hover = preflight.evaluate_hover(self._hover_throttle, self._radio.hover_limits(self._loop))
         items = (*items, *needed, *hover, preflight.evaluate_set_points(order.set_points))
         self._require_not_quarantined()
         preflight.require(items)
@@ -615,7 +616,7 @@ class MavlinkVehicle:
         """Return the parameters that the flight needs."""
         profile, target = self._radio.profile, self._radio.target
         settings = profile.take_off_settings(target)
-        return (*settings, *profile.set_point_settings(target)) if _flies_steps(order) else settings
+        return (*settings, *profile.set_point_settings) if _flies_steps(order) else settings
 
     def _prepare_set_points(self, order: FlightOptions) -> None:
         """Request the telemetry that a flight with several set points needs, and read the parameters of its loop, which

@@ -4,15 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Position
 from app.vehicles.base import FlightRecord, StopRequest
-from app.vehicles.mavlink.events import (
-    AbortRequested,
-    Action,
-    ActionRefused,
-    MotorsOffRequested,
-    Position,
-    SecondaryAltitudeReceived,
-)
+from app.vehicles.mavlink.events import AbortRequested, ActionRefused, MotorsOffRequested, SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import contact_of, has_flown
 from app.vehicles.mavlink.trial_reactions import State

@@ -4,14 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from app.vehicles.mavlink.events import (
-    AbortRequested,
-    Action,
-    ActionDone,
-    BlockEntered,
-    MotorsOffRequested,
-    SecondaryAltitudeReceived,
-)
+from app.autopilots.commands import Action
+from app.autopilots.measurements import BlockEntered
+from app.vehicles.mavlink.events import AbortRequested, ActionDone, MotorsOffRequested, SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import ending_of
 from app.vehicles.mavlink.trial_reactions import State

@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.measurements import Battery, FenceBreach, Heartbeat, Measurement, Position
 from app.vehicles.mavlink import limit_checks
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import Battery, FenceBreach, Heartbeat, Measurement, Position
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS

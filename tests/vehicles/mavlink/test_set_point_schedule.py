@@ -5,18 +5,16 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import BlockEntered, Heartbeat, TargetAltitude
 from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink.events import (
-    Action,
     ActionDone,
     ActionRefused,
-    BlockEntered,
     Command,
-    Heartbeat,
     MotorsOffRequested,
     PerformAction,
     SetPointsPaused,
-    TargetAltitude,
     WithdrawSetPoint,
 )
 from app.vehicles.mavlink.failures import Failure

@@ -6,29 +6,30 @@ from dataclasses import replace
 
 import pytest
 
-from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.boot_clock import WRAP_S
-from app.vehicles.mavlink.events import (
+from app.autopilots.autopilot import ModeParameter
+from app.autopilots.commands import Action, Setting
+from app.autopilots.measurements import (
     DISARMING,
-    AbortRequested,
-    Action,
-    ActionDone,
-    ActionRefused,
     Attitude,
     BlockEntered,
     CommandReply,
-    DuplicateVehicleDetected,
     FenceBreach,
     Heartbeat,
-    ModeParameter,
     Parameter,
-    PerformAction,
     Position,
+)
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.boot_clock import WRAP_S
+from app.vehicles.mavlink.events import (
+    AbortRequested,
+    ActionDone,
+    ActionRefused,
+    DuplicateVehicleDetected,
+    PerformAction,
     RequestGain,
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
-    Setting,
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_machine import Plan, begin
