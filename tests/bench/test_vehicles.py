@@ -6,7 +6,7 @@ from app.core.models.vertical import GRAVITY_M_S2
 from app.core.records.trajectory import Trajectory
 from app.vehicles.jsbsim import FULL_THRUST_N
 from bench.targets.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error, own_optimum, population
-from tests.vehicles.flying import TAKEOFF, TUNED, flown
+from tests.vehicles.flying import SAFE, TAKEOFF, TUNED, flown
 
 FURTHER = population("further-physics", 20, 3)
 FOUR = population("four-parameter", 20, 3)
@@ -91,3 +91,9 @@ def test_the_twins_own_optimum_is_at_least_as_good_as_the_reference_measurement(
     assert optimum.error == noise_free_error(twin, optimum.gains)
     assert optimum.error <= 0.11815
     TAKEOFF.space.check(optimum.gains)
+
+
+@pytest.mark.complete
+def test_a_search_in_jsbsim_ends_below_the_known_good_gains() -> None:
+    optimum = own_optimum(FURTHER[9])
+    assert optimum.error < noise_free_error(FURTHER[9], TUNED) < noise_free_error(FURTHER[9], SAFE)

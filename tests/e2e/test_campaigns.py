@@ -40,7 +40,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
     campaign_id = dashboard.when_ready(dashboard.campaign_id)
     finished = page.get_by_role("heading", name=re.compile("^(Converged|Flight budget used)"))
-    for number, most in zip(range(1, 8), (3, 2, 1, 1, 1, 1, 1), strict=True):
+    for number, most in enumerate((3, 2, 1, 1, 1, 1, 1), 1):
         dashboard.fly()
         dashboard.wait_for_flight(number)
         assert 1 <= clicks(page) <= most
