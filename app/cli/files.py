@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from app.autopilots.takeoffs import Takeoff
 from app.bundles.export import write_bundle
 from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
@@ -22,7 +23,6 @@ from app.common.settings import Settings
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.logs.takeoffs import Takeoff
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of

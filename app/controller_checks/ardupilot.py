@@ -6,13 +6,13 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.replica_check import read_ardupilot_log
+from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
 from app.core.control.ardupilot import OUTPUTS
 from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
 from app.core.control.ardupilot_replay import LoopTrace, replayed
-from app.logs.ardupilot_log import read_ardupilot_log
-from app.logs.ardupilot_trace import is_ardupilot_trace, read_ardupilot_trace
 from app.logs.dataflash import is_dataflash
 
 _PRECISION: Final = "firmware and recording have single precision"

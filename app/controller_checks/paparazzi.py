@@ -7,6 +7,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.paparazzi.log import is_paparazzi, read_loop_log
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import (
     Result,
@@ -35,7 +36,6 @@ from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, repl
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
 from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
-from app.logs.paparazzi import is_paparazzi, read_loop_log
 
 _MAX_DIGITS: Final = 9
 

@@ -7,6 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.px4.replica_check import read_px4_log
+from app.autopilots.px4.trace import is_px4_trace, read_px4_trace
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
@@ -14,8 +16,6 @@ from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_replay import LoopTrace, Replay, replayed
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
-from app.logs.px4_log import read_px4_log
-from app.logs.px4_trace import is_px4_trace, read_px4_trace
 from app.logs.ulog_tables import is_ulog
 
 _TOLERANCE: Final = 1e-5

@@ -3,6 +3,12 @@
 import io
 from typing import Final
 
+from app.autopilots.ardupilot.flight import read_ardupilot_flight
+from app.autopilots.copter_tlog import is_copter_tlog, read_copter_tlog
+from app.autopilots.paparazzi.log import is_paparazzi
+from app.autopilots.px4.flight import read_px4_flight
+from app.autopilots.readers import HEAD_BYTES, read_takeoffs
+from app.autopilots.takeoffs import Takeoff
 from app.core.analysis.analysis import analyze
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
@@ -10,13 +16,7 @@ from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.log_analyses.copter_start import CopterStart, start_of
 from app.log_analyses.manoeuvres import AnalysedManoeuvres
 from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
-from app.logs.ardupilot_flight import read_ardupilot_flight
-from app.logs.copter_tlog import is_copter_tlog, read_copter_tlog
 from app.logs.dataflash import is_dataflash
-from app.logs.paparazzi import is_paparazzi
-from app.logs.px4_flight import read_px4_flight
-from app.logs.readers import HEAD_BYTES, read_takeoffs
-from app.logs.takeoffs import Takeoff
 from app.logs.tlog_frames import is_tlog
 from app.logs.ulog_tables import is_ulog
 

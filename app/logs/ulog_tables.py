@@ -15,8 +15,6 @@ import numpy as np
 from app.core.formatting import count, times
 from app.core.records.trajectory import Samples
 from app.logs.base import Contents, Table, contents, numbers, refused
-from app.logs.flight_parts import held
-from app.logs.takeoffs import Setting
 
 _MAGIC: Final = b"ULog\x01\x12\x35"
 _HEADER_BYTES: Final = 16
@@ -34,11 +32,11 @@ HINT: Final = "Use PX4's .ulg log of the flight, with vehicle_local_position in 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ULogTables:
-    """The first instance of each wanted topic, the values of the wanted parameters in order of their time, of which
-    those from before the log are at −∞, and remarks on what the log lacks."""
+    """The first instance of each wanted topic, time, s, name and value of the wanted parameters in order of their time,
+    of which those from before the log are at −∞, and remarks on what the log lacks."""
 
     topics: Mapping[str, Table]
-    settings: Sequence[Setting]
+    settings: Sequence[tuple[float, str, float]]
     notes: Sequence[str]
 
 
@@ -70,7 +68,7 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], parameters: C
         notes.append(f"the logger dropped data {times(len(log.dropouts))}, {lost_s:.2f} s in total")
     return ULogTables(
         topics={each.name: each.data for each in log.data_list},
-        settings=tuple(Setting(at_s, name, float(value)) for at_s, name, value in values if np.isfinite(value)),
+        settings=tuple((at_s, name, float(value)) for at_s, name, value in values if np.isfinite(value)),
         notes=notes,
     )
 
@@ -83,13 +81,6 @@ def seconds(table: Table) -> Samples:
 def has_rows(table: Table, *names: str) -> bool:
     """Whether a topic was logged, with these columns."""
     return {"timestamp", *names} <= table.keys() and len(table["timestamp"]) > 0
-
-
-def latest(table: Table, name: str, time_s: Samples) -> Samples:
-    """A column as it was last published at each time, shape (n,); NaN before, and if it is missing."""
-    if not has_rows(table, name):
-        return np.full(len(time_s), np.nan)
-    return held(seconds(table), numbers(table[name]), time_s)
 
 
 @dataclass(slots=True)

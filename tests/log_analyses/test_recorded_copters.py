@@ -7,15 +7,15 @@ from functools import cache
 
 import pytest
 
+from app.autopilots.ardupilot.flight import read_ardupilot_flight
+from app.autopilots.copter_tlog import read_copter_tlog
+from app.autopilots.px4.flight import read_px4_flight
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
-from app.logs.ardupilot_flight import read_ardupilot_flight
-from app.logs.copter_tlog import read_copter_tlog
-from app.logs.px4_flight import read_px4_flight
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
 

@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.flight import read_ardupilot_flight
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError
 from app.core.records.trajectory import Samples
-from app.logs.ardupilot_flight import read_ardupilot_flight
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.logs.recorded import recorded
 from tests.logs.written import (

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.replica_check import read_ardupilot_log
 from app.core.control.ardupilot_log import LoopLog
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError
-from app.logs.ardupilot_log import read_ardupilot_log
 from tests.logs.recorded import recorded
 
 LOG = recorded("arducopter_steps.bin")

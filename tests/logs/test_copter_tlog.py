@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.copter_tlog import is_copter_tlog, read_copter_tlog
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.errors import InputError
-from app.logs.copter_tlog import is_copter_tlog, read_copter_tlog
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS
 from tests.logs.written_tlog import CLIMB_AND_DESCENT, LOITER, PX4_RECORDING, Recording, flown, repeated_and_late

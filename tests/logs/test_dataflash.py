@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pymavlink import DFReader
 
+from app.autopilots.readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
 from app.logs.dataflash import read_tables
-from app.logs.readers import read_takeoff, read_takeoffs
 from tests.logs.recorded import OnBoardLog, recorded
 
 LOG = "arducopter_takeoff.bin"

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.px4.flight import read_px4_flight
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import Segment
 from app.core.control.px4_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError
-from app.logs.px4_flight import read_px4_flight
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.recorded import recorded
 from tests.logs.written_px4 import FLIGHT as IN_FLIGHT

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.px4.replica_check import read_px4_log
 from app.core.control.px4 import FLIGHT
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_parameters import Parameters
 from app.core.errors import InputError
-from app.logs.px4_log import read_px4_log
 from tests.logs.recorded import recorded
 
 LOG = recorded("px4_takeoff.ulg")

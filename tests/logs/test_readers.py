@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.readers import READERS, SUFFIXES, read_takeoffs
+from app.autopilots.takeoffs import MIN_SAMPLES
 from app.core.errors import TrajectoryError
 from app.logs import base
-from app.logs.readers import READERS, SUFFIXES, read_takeoffs
-from app.logs.takeoffs import MIN_SAMPLES
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import OnBoardLog, recorded
 from tests.logs.test_ulog import small_log

@@ -8,10 +8,10 @@ import pytest
 from pymavlink.dialects.v10 import paparazzi
 from pymavlink.dialects.v20 import ardupilotmega, common
 
+from app.autopilots.readers import read_takeoff, read_takeoffs
+from app.autopilots.takeoffs import NOT_COMMANDED
 from app.core.errors import TrajectoryError
-from app.logs.readers import read_takeoff, read_takeoffs
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.logs.takeoffs import NOT_COMMANDED
 from tests.logs.recorded import SCRIPT_CURRENT_4, TAKEOFFS, TLOGS, Telemetry, recorded
 from tests.vehicles.flying import TAKEOFF
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from app.autopilots.px4.log import read_ulog
+from app.autopilots.readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
-from app.logs.readers import read_takeoff, read_takeoffs
-from app.logs.ulog import read_ulog
 from tests.logs.recorded import ULOG_HEADER as HEADER
 from tests.logs.recorded import recorded
 from tests.logs.recorded import ulog_message as message

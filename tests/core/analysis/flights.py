@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.autopilots.ardupilot.flight import read_ardupilot_flight
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import LEAD_S
 from app.core.control.ardupilot_parameters import Parameters
-from app.logs.ardupilot_flight import read_ardupilot_flight
 from bench.copters.simulation import SimulatedCopter, fly_steps
 from tests.logs.recorded import recorded
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.replica_check import read_ardupilot_log
 from app.core.control.ardupilot_log import COMPARED, SHAPED, LogComparison, LoopLog, compare_log
-from app.logs.ardupilot_log import read_ardupilot_log
 from tests.logs.recorded import recorded
 
 ARRAYS = (

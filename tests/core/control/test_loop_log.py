@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 
+from app.autopilots.paparazzi.log import read_loop_log
 from app.core.control import paparazzi as loop
 from app.core.control.loop_log import (
     FIELDS,
@@ -18,7 +19,6 @@ from app.core.control.loop_log import (
     infer_gains,
 )
 from app.core.policy import Gains
-from app.logs.paparazzi import read_loop_log
 from tests.logs.paparazzi_flights import Flight, data_of
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}

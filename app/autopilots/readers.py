@@ -6,14 +6,15 @@ from io import BytesIO
 from pathlib import PurePath
 from typing import BinaryIO, Final
 
+from app.autopilots.ardupilot.log import read_dataflash
+from app.autopilots.paparazzi.log import is_paparazzi, read_paparazzi
+from app.autopilots.px4.log import read_ulog
+from app.autopilots.takeoffs import FlightLog, Takeoff, choose, find_takeoffs
+from app.autopilots.tlog import read_tlog
 from app.core.errors import Problem, TrajectoryError
-from app.logs.dataflash import is_dataflash, read_dataflash
-from app.logs.paparazzi import is_paparazzi, read_paparazzi
+from app.logs.dataflash import is_dataflash
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.logs.takeoffs import FlightLog, Takeoff, choose, find_takeoffs
-from app.logs.tlog import read_tlog
 from app.logs.tlog_frames import is_tlog
-from app.logs.ulog import read_ulog
 from app.logs.ulog_tables import is_ulog
 
 HEAD_BYTES: Final = 256

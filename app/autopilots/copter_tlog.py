@@ -11,6 +11,27 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.copter_autopilots import AUTOPILOTS, MESSAGE_NAMES, CopterAutopilot
+from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
+from app.autopilots.copter_telemetry import (
+    ATTITUDE_TARGET,
+    LOCAL_POSITION_NED,
+    NAV_CONTROLLER_OUTPUT,
+    POSITION_TARGET_LOCAL_NED,
+    Sender,
+    Telemetry,
+    find_vehicle,
+)
+from app.autopilots.segments import (
+    LARGEST_LEAN,
+    LONGEST_INTERVAL_S,
+    SHORTEST_PART_S,
+    ParameterHistory,
+    Parameters,
+    Rows,
+    choose_parts,
+    usable_rows,
+)
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import (
     LARGEST_INTERVAL_S,
@@ -26,27 +47,6 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
 from app.core.records.trajectory import Samples, Trajectory
 from app.logs.base import Contents, contents
-from app.logs.copter_autopilots import AUTOPILOTS, MESSAGE_NAMES, CopterAutopilot
-from app.logs.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
-from app.logs.copter_telemetry import (
-    ATTITUDE_TARGET,
-    LOCAL_POSITION_NED,
-    NAV_CONTROLLER_OUTPUT,
-    POSITION_TARGET_LOCAL_NED,
-    Sender,
-    Telemetry,
-    find_vehicle,
-)
-from app.logs.flight_parts import (
-    LARGEST_LEAN,
-    LONGEST_INTERVAL_S,
-    SHORTEST_PART_S,
-    ParameterHistory,
-    Parameters,
-    Rows,
-    choose_parts,
-    usable_rows,
-)
 from app.logs.tlog_frames import is_tlog
 
 _COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})

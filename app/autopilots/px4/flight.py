@@ -13,6 +13,20 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.px4.log import latest
+from app.autopilots.segments import (
+    LARGEST_LEAN,
+    LONGEST_INTERVAL_S,
+    SHORTEST_PART_S,
+    ParameterHistory,
+    Parameters,
+    Rows,
+    choose_parts,
+    increasing,
+    jumps,
+    thinned,
+    usable_rows,
+)
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import SPACE, Px4Loop
 from app.core.analysis.segment import FinerSegment, Segment
@@ -26,20 +40,7 @@ from app.core.control.px4_parameters import (
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
-from app.logs.flight_parts import (
-    LARGEST_LEAN,
-    LONGEST_INTERVAL_S,
-    SHORTEST_PART_S,
-    ParameterHistory,
-    Parameters,
-    Rows,
-    choose_parts,
-    increasing,
-    jumps,
-    thinned,
-    usable_rows,
-)
-from app.logs.ulog_tables import ULogTables, has_rows, latest, read_ulog_tables, seconds
+from app.logs.ulog_tables import ULogTables, has_rows, read_ulog_tables, seconds
 
 _POSITION, _TARGET, _SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
 _TAKEOFF, _STATUS = "takeoff_status", "vehicle_status"
@@ -174,7 +175,7 @@ def read_px4_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         (logged.lean >= LARGEST_LEAN, f"{_TARGET}.thrust", "leans by more than 30° throughout the flight"),
     )
     usable = usable_rows(conditions, partial(_refused, tables, name))
-    history = ParameterHistory.of((each.time_s, each.name, each.value) for each in tables.settings)
+    history = ParameterHistory.of(tables.settings)
     given, chosen = choose_parts(logged.time_s, usable, logged.is_reset, history, _manoeuvres(logged))
     if not chosen:
         raise _refused(

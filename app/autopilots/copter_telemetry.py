@@ -14,9 +14,9 @@ from typing import Final, Self
 
 import numpy as np
 
+from app.autopilots.segments import increasing
 from app.core.records.trajectory import Samples
 from app.logs.base import Contents
-from app.logs.flight_parts import increasing
 from app.logs.tlog_frames import Frame, frames, is_whole, payload_of
 
 ARDUPILOT, PAPARAZZI, PX4 = 3, 9, 12

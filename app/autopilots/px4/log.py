@@ -10,10 +10,11 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.segments import held
+from app.autopilots.takeoffs import FlightLog, LogEvent, Setting, Span, spans_of
 from app.core.records.trajectory import Samples
 from app.logs.base import PX4_SETS, Table, names_in, numbers, refused, rows_of
-from app.logs.takeoffs import FlightLog, LogEvent, Span, spans_of
-from app.logs.ulog_tables import HINT, read_ulog_tables, seconds
+from app.logs.ulog_tables import HINT, has_rows, read_ulog_tables, seconds
 
 _POSITION, _SET_POINT, _THRUST = "vehicle_local_position", "vehicle_local_position_setpoint", "vehicle_thrust_setpoint"
 _BATTERY, _STATUS, _LANDED = "battery_status", "vehicle_status", "vehicle_land_detected"
@@ -47,7 +48,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
         channels=_channels(position, topics),
         from_ground=True,
         gain_sets=PX4_SETS,
-        settings=tables.settings,
+        settings=tuple(Setting(*each) for each in tables.settings),
         starts=starts,
         ends=[*ends, *landings],
         landings=landings,
@@ -55,6 +56,13 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
         armed=_armed(topics),
         notes=(*tables.notes, *_missing(topics)),
     )
+
+
+def latest(table: Table, name: str, time_s: Samples) -> Samples:
+    """A column as it was last published at each time, shape (n,); NaN before, and if it is missing."""
+    if not has_rows(table, name):
+        return np.full(len(time_s), np.nan)
+    return held(seconds(table), numbers(table[name]), time_s)
 
 
 def _channels(position: Table, topics: Mapping[str, Table]) -> dict[str, Samples]:

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.core.analysis import ardupilot_loop, px4_loop
-from app.core.control import ardupilot_parameters, px4_parameters
-from app.logs.copter_telemetry import (
+from app.autopilots.copter_telemetry import (
     ARDUPILOT,
     ATTITUDE_TARGET,
     LOCAL_POSITION_NED,
@@ -15,6 +13,8 @@ from app.logs.copter_telemetry import (
     POSITION_TARGET_LOCAL_NED,
     PX4,
 )
+from app.core.analysis import ardupilot_loop, px4_loop
+from app.core.control import ardupilot_parameters, px4_parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,8 @@ from typing import BinaryIO, Final, Protocol
 
 import numpy as np
 
+from app.autopilots.segments import held
+from app.autopilots.takeoffs import FlightLog, LogEvent, Setting, Span, spans_of
 from app.core.records.trajectory import THROTTLE_HOLDS_S, Samples
 from app.logs.base import (
     ARDUPILOT_SETS,
@@ -27,8 +29,6 @@ from app.logs.base import (
     names_in,
     refused,
 )
-from app.logs.flight_parts import held
-from app.logs.takeoffs import FlightLog, LogEvent, Setting, Span, spans_of
 from app.logs.tlog_frames import frames, is_whole, payload_of
 
 _POSITION: Final = struct.Struct("<I6f")

@@ -15,12 +15,12 @@ from xml.parsers import expat
 
 import numpy as np
 
+from app.autopilots.takeoffs import FlightLog, LogEvent, Setting
 from app.core.control.loop_log import FIELDS, GAINS, FlownGains, LoopLog, flown_gains
 from app.core.control.paparazzi import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
 from app.logs.base import PAPARAZZI_SETS, refused
-from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20
 _MAX_SAMPLES: Final = 2_000_000

@@ -10,6 +10,19 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.segments import (
+    LARGEST_LEAN,
+    LONGEST_INTERVAL_S,
+    SHORTEST_PART_S,
+    ParameterHistory,
+    Parameters,
+    Rows,
+    beside,
+    choose_parts,
+    jumps,
+    thinned,
+    usable_rows,
+)
 from app.core.analysis.ardupilot_loop import SPACE, ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
@@ -28,19 +41,6 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import parameters_in, read_tables
-from app.logs.flight_parts import (
-    LARGEST_LEAN,
-    LONGEST_INTERVAL_S,
-    SHORTEST_PART_S,
-    ParameterHistory,
-    Parameters,
-    Rows,
-    beside,
-    choose_parts,
-    jumps,
-    thinned,
-    usable_rows,
-)
 
 _WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM", "MSG"})
 _LOOP: Final = ("PD", "VD", "AD", "DVD", "DAD", "TVD")

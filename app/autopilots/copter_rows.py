@@ -5,11 +5,11 @@ from typing import Final, Self
 
 import numpy as np
 
+from app.autopilots.copter_autopilots import CopterAutopilot
+from app.autopilots.copter_telemetry import Telemetry
+from app.autopilots.segments import LONGEST_INTERVAL_S, Part, Rows, beside, held, jumps
 from app.core.analysis.segment import LEAD_S
 from app.core.records.trajectory import Samples, Trajectory
-from app.logs.copter_autopilots import CopterAutopilot
-from app.logs.copter_telemetry import Telemetry
-from app.logs.flight_parts import LONGEST_INTERVAL_S, Part, Rows, beside, held, jumps
 
 _HEARTBEAT_HOLDS_S: Final = 5.0
 OFF_GROUND_M: Final = 0.5

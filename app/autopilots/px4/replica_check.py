@@ -6,14 +6,14 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.px4.log import latest
 from app.core.control.px4 import FLIGHT, HOVER_MAX, HOVER_MIN, RAMP_UP
 from app.core.control.px4_log import LoopLog
 from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, UNSUPPORTED, Parameters, parameters_from
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
-from app.logs.takeoffs import Setting
-from app.logs.ulog_tables import has_rows, latest, read_ulog_tables, seconds
+from app.logs.ulog_tables import has_rows, read_ulog_tables, seconds
 
 _POSITION, _TARGET, _SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
 _TAKEOFF, _HOVER = "takeoff_status", "hover_thrust_estimate"
@@ -60,7 +60,7 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
         raise _refused(name, _TARGET, "has no row in flight beside a position")
     begin_s = float(time_s[rows[0]])
     rows = rows[time_s[rows] < _first_change_s(tables.settings, begin_s)]
-    values = {each.name: each.value for each in tables.settings if each.time_s <= begin_s}
+    values = {each: value for at_s, each, value in tables.settings if at_s <= begin_s}
     for gain in GAINS:
         if gain not in values:
             raise _refused(name, gain, "is missing")
@@ -91,13 +91,13 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
     )
 
 
-def _first_change_s(settings: Sequence[Setting], begin_s: float) -> float:
+def _first_change_s(settings: Sequence[tuple[float, str, float]], begin_s: float) -> float:
     """When a parameter first has another value than at the beginning; infinite if none has."""
     values: dict[str, float] = {}
-    for each in settings:
-        if each.time_s > begin_s and values.get(each.name) != each.value:
-            return each.time_s
-        values[each.name] = each.value
+    for at_s, name, value in settings:
+        if at_s > begin_s and values.get(name) != value:
+            return at_s
+        values[name] = value
     return np.inf
 
 
