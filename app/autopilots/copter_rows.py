@@ -7,7 +7,8 @@ import numpy as np
 
 from app.autopilots.copter_autopilots import CopterAutopilot
 from app.autopilots.copter_telemetry import Telemetry
-from app.autopilots.segments import LONGEST_INTERVAL_S, Part, Rows, beside, held, jumps
+from app.autopilots.recording import LONGEST_INTERVAL_S, Rows, beside, held
+from app.autopilots.segments import Part, jumps
 from app.core.analysis.segment import LEAD_S
 from app.core.records.trajectory import Samples, Trajectory
 

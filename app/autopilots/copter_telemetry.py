@@ -14,7 +14,7 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.autopilots.segments import increasing
+from app.autopilots.recording import increasing
 from app.core.records.trajectory import Samples
 from app.logs.base import Contents
 from app.logs.tlog_frames import Frame, frames, is_whole, payload_of

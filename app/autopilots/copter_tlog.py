@@ -22,13 +22,10 @@ from app.autopilots.copter_telemetry import (
     Telemetry,
     find_vehicle,
 )
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Rows
 from app.autopilots.segments import (
     LARGEST_LEAN,
-    LONGEST_INTERVAL_S,
     SHORTEST_PART_S,
-    ParameterHistory,
-    Parameters,
-    Rows,
     choose_parts,
     usable_rows,
 )

@@ -6,41 +6,69 @@ from io import BytesIO
 from pathlib import PurePath
 from typing import BinaryIO, Final
 
-from app.autopilots.ardupilot.log import read_dataflash
+from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.paparazzi.log import is_paparazzi, read_paparazzi
-from app.autopilots.px4.log import read_ulog
-from app.autopilots.takeoffs import FlightLog, Takeoff, choose, find_takeoffs
+from app.autopilots.px4.log import read_px4
+from app.autopilots.recording import Recording
+from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
 from app.autopilots.tlog import read_tlog
 from app.core.errors import Problem, TrajectoryError
+from app.logs.base import refused
 from app.logs.dataflash import is_dataflash
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.logs.tlog_frames import is_tlog
+from app.logs.ulog_tables import HINT as ULOG_HINT
 from app.logs.ulog_tables import is_ulog
 
 HEAD_BYTES: Final = 256
 _COMPANION: Final = ".log"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
-    """One kind of log: its file suffix and title, a test of its first bytes, and the function that reads it."""
+    """One kind of log: its file suffix and title, a test of its first bytes, and the function that reads it.
+    `altitude` are the messages that have it, and `hint` says which log to use where it has none."""
 
     suffix: str
     title: str
     recognises: Callable[[bytes], bool]
-    read: Callable[[BinaryIO, BinaryIO | None], FlightLog]
+    read: Callable[[BinaryIO, BinaryIO | None], Recording]
+    altitude: str = ""
+    hint: str = ""
 
 
-def _alone(read: Callable[[BinaryIO], FlightLog]) -> Callable[[BinaryIO, BinaryIO | None], FlightLog]:
+def _alone(read: Callable[[BinaryIO], Recording]) -> Callable[[BinaryIO, BinaryIO | None], Recording]:
     """Adapt a reader of logs without a companion."""
     return lambda stream, _companion: read(stream)
 
 
 READERS: Final = (
-    Reader(".tlog", "MAVLink telemetry log", is_tlog, _alone(read_tlog)),
-    Reader(".bin", "ArduPilot's on-board log", is_dataflash, _alone(read_dataflash)),
-    Reader(".ulg", "PX4's log", is_ulog, _alone(read_ulog)),
-    Reader(".data", "Paparazzi's ground log", is_paparazzi, read_paparazzi),
+    Reader(
+        suffix=".tlog",
+        title="MAVLink telemetry log",
+        recognises=is_tlog,
+        read=_alone(read_tlog),
+        altitude="no LOCAL_POSITION_NED of the vehicle",
+        hint="Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
+        "contain the ground station's commands.",
+    ),
+    Reader(
+        suffix=".bin",
+        title="ArduPilot's on-board log",
+        recognises=is_dataflash,
+        read=_alone(read_ardupilot),
+        altitude="neither PSCD.PD nor CTUN.Alt, the altitude",
+        hint="Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN).",
+    ),
+    Reader(
+        suffix=".ulg",
+        title="PX4's log",
+        recognises=is_ulog,
+        read=_alone(read_px4),
+        altitude="no vehicle_local_position.z, the altitude",
+        hint=ULOG_HINT,
+    ),
+    Reader(suffix=".data", title="Paparazzi's ground log", recognises=is_paparazzi, read=read_paparazzi),
 )
 
 SUFFIXES: Final = (".csv", *(reader.suffix for reader in READERS))
@@ -57,7 +85,10 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     stream.seek(0)
     reader = next((reader for reader in READERS if reader.recognises(head)), None)
     if reader is not None:
-        return find_takeoffs(reader.read(stream, companion))
+        recording = reader.read(stream, companion)
+        if "altitude_m" not in recording.columns:
+            raise refused(f"contains {reader.altitude}", reader.hint)
+        return find_takeoffs(recording)
     suffix = PurePath(name).suffix.lower()
     if suffix == _COMPANION:
         raise TrajectoryError(

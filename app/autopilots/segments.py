@@ -1,16 +1,15 @@
 """Parts of a logged flight that can be analysed: rows that follow each other without a gap, a jump or a change."""
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Self
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Rows
+from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 
-LONGEST_INTERVAL_S: Final = 0.25
 SHORTEST_PART_S: Final = 4.0
 LONGEST_FLIGHT_S: Final = 120.0
 LARGEST_LEAN: Final = 0.866
@@ -21,37 +20,19 @@ _ALREADY_THIN: Final = 0.9
 Part = tuple[int, int]
 """First row, and the row after the last."""
 
-Rows = NDArray[np.bool_]
 
-Parameters = Mapping[str, float]
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterHistory:
-    """The values in force from each time on, s, increasing."""
-
-    times_s: Sequence[float]
-    values: Sequence[Parameters]
-
-    @classmethod
-    def of(cls, logged: Iterable[tuple[float, str, float]]) -> Self:
-        """The history of logged values (time, name, value), in order of time."""
-        times_s, history = [], []
-        values: Parameters = {}
-        for time_s, name, value in logged:
-            if np.isfinite(value) and values.get(name) != value:
-                values = {**values, name: value}
-                times_s.append(time_s)
-                history.append(values)
-        return cls(times_s, history)
-
-    def at(self, time_s: float) -> Parameters:
-        """The values at a time."""
-        place = bisect_right(self.times_s, time_s) - 1
-        return self.values[place] if place >= 0 else {}
+Refused = Callable[[str, str], Exception]
+"""The error that a field and a reason make."""
 
 
-def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Callable[[str, str], Exception]) -> Rows:
+def refusal(happened: str, hint: str, notes: Sequence[str] = ()) -> Refused:
+    """Errors of a log in which this happened, with `notes` after each reason."""
+    return lambda field, reason: TrajectoryError(
+        happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),)
+    )
+
+
+def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Refused) -> Rows:
     """Rows, shape (n,), that meet all conditions. Raises what `refused` makes of the field and the reason of the first
     condition that leaves none."""
     usable = np.ones_like(conditions[0][0])
@@ -62,35 +43,20 @@ def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Callable[[
     return usable
 
 
+def require_gains(given: Parameters, bounds: Mapping[str, tuple[float, float]], absent: str, refused: Refused) -> None:
+    """Require that the loop had all gains of the search, positive where the search has no zero. Raises what `refused`
+    makes of the gain and the reason, `absent` if it is missing."""
+    for each, (least, _) in bounds.items():
+        if each not in given:
+            raise refused(each, absent)
+        if given[each] < 0.0 or (least and not given[each]):
+            raise refused(each, f"must be positive, got {given[each]:g}")
+
+
 def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> Rows:
     """Rows, shape (n,), whose value differs by more than `largest` from what its rate made of the one before."""
     followed = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time_s)
     return np.append(False, np.abs(np.diff(values) - followed) > largest)
-
-
-def increasing(at_s: Samples) -> NDArray[np.int64]:
-    """Rows, shape (k,), each later than all before it."""
-    return np.flatnonzero(np.diff(np.maximum.accumulate(at_s), prepend=-np.inf) > 0.0)
-
-
-def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:
-    """Values known at `at_s`, shape (k,) each, which increases, at other times, shape (n,), linear between its rows;
-    NaN outside them, and between two that are too far apart."""
-    if len(at_s) < 2:
-        return np.full(len(time_s), np.nan)
-    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
-    found = np.interp(time_s, at_s, values, left=np.nan, right=np.nan)
-    found[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
-    return found
-
-
-def held(at_s: Samples, values: Samples, time_s: Samples, *, longest_s: float = np.inf) -> Samples:
-    """The value last reported at each time, shape (n,), of those at `at_s`, shape (k,), which increases; NaN before the
-    first, and where the last is older than `longest_s`."""
-    last = np.searchsorted(at_s, time_s, side="right") - 1
-    if not len(at_s):
-        return np.full(len(time_s), np.nan)
-    return np.where((last >= 0) & (time_s - at_s[last] <= longest_s), values[last], np.nan)
 
 
 def find_parts(time_s: Samples, usable: Rows, begins: Rows, cuts_s: Sequence[float]) -> list[Part]:

@@ -15,20 +15,24 @@ from typing import BinaryIO, Final, Protocol
 
 import numpy as np
 
-from app.autopilots.segments import held
-from app.autopilots.takeoffs import FlightLog, LogEvent, Setting, Span, spans_of
-from app.core.records.trajectory import THROTTLE_HOLDS_S, Samples
-from app.logs.base import (
-    ARDUPILOT_SETS,
-    PAPARAZZI,
-    PAPARAZZI_SETS,
-    PX4_SETS,
-    Contents,
+from app.autopilots.ardupilot.log import GAIN_SETS as ARDUPILOT_SETS
+from app.autopilots.paparazzi.log import GAIN_SETS as PAPARAZZI_SETS
+from app.autopilots.paparazzi.log import PARAMETERS
+from app.autopilots.px4.log import GAIN_SETS as PX4_SETS
+from app.autopilots.recording import (
+    Column,
+    Event,
+    EventKind,
     GainSets,
-    contents,
+    Recording,
+    Setting,
+    Span,
+    increasing,
     names_in,
-    refused,
+    spans_of,
 )
+from app.core.records.trajectory import THROTTLE_HOLDS_S
+from app.logs.base import Contents, contents, refused
 from app.logs.tlog_frames import frames, is_whole, payload_of
 
 _POSITION: Final = struct.Struct("<I6f")
@@ -80,7 +84,7 @@ def _own_names(sets: GainSets) -> Mapping[str, str]:
 _AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
     {
         9: _Autopilot(
-            "Paparazzi", "v10.paparazzi", PAPARAZZI_SETS, PAPARAZZI, from_ground=False, keeps_whole_numbers=True
+            "Paparazzi", "v10.paparazzi", PAPARAZZI_SETS, PARAMETERS, from_ground=False, keeps_whole_numbers=True
         ),
         3: _Autopilot("ArduPilot", "v20.ardupilotmega", ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
         12: _Autopilot("PX4", "v20.common", PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
@@ -92,7 +96,7 @@ Paparazzi's altitude is above its local origin, that of the others above the gro
 """
 
 
-def read_tlog(stream: BinaryIO) -> FlightLog:
+def read_tlog(stream: BinaryIO) -> Recording:
     """Read a whole log. Raises TrajectoryError if it contains no flight of a known vehicle."""
     data = contents(stream)
     system, autopilot = _vehicle(data)
@@ -110,7 +114,7 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
             except dialect.MAVError:
                 continue
             conversation.handlers[frame.message](message)
-    return conversation.log()
+    return conversation.recording()
 
 
 def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
@@ -122,14 +126,6 @@ def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
                 return frame.system, autopilot
     known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
     raise refused(f"contains no MAVLink heartbeat of {known}", _HINT)
-
-
-@dataclass(slots=True)
-class _Sent:
-    """A command without an answer so far."""
-
-    moment: LogEvent
-    moments: list[LogEvent]
 
 
 @dataclass(slots=True)
@@ -153,10 +149,8 @@ class _Telemetry:
     _entered: list[tuple[float, int]] = field(default_factory=list)
     _settings: list[Setting] = field(default_factory=list)
     _asked: dict[str, float] = field(default_factory=dict)
-    _sent: dict[int, _Sent] = field(default_factory=dict)
-    _starts: list[LogEvent] = field(default_factory=list)
-    _ends: list[LogEvent] = field(default_factory=list)
-    _landings: list[LogEvent] = field(default_factory=list)
+    _sent: dict[int, Event] = field(default_factory=dict)
+    _events: list[Event] = field(default_factory=list)
     _armed: bool = False
     _arming: list[tuple[float, bool]] = field(default_factory=list)
     _heard_s: float = -np.inf
@@ -192,41 +186,41 @@ class _Telemetry:
         self._altitude_m.append(-down_m)
         self._climb_rate_m_s.append(-down_m_s)
 
-    def log(self) -> FlightLog:
-        """The log as read so far. Raises TrajectoryError if there was no position."""
-        if not self._time_s:
-            raise refused("contains no LOCAL_POSITION_NED of the vehicle", _HINT)
-        for sent in self._sent.values():  # a command without an answer counts as accepted
-            sent.moments.append(sent.moment)
+    def recording(self) -> Recording:
+        """What was read so far."""
+        self._events.extend(self._sent.values())  # a command without an answer counts as accepted
         for time_s, number in self._activated:
             name = self._blocks.get(number, "")
-            moments = self._starts if "takeoff" in name.casefold().replace(" ", "").replace("_", "") else self._ends
-            moments.append(LogEvent(time_s, f"the block {name}" if name else f"block {number}"))
-        return FlightLog(
+            takes_off = "takeoff" in name.casefold().replace(" ", "").replace("_", "")
+            kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
+            self._events.append(Event(kind, time_s, f"the block {name}" if name else f"block {number}"))
+        return Recording(
             title=f"MAVLink log of {self.autopilot.title}",
             clock="vehicle",
-            time_s=np.array(self._time_s),
-            channels=self._channels(),
+            columns=self._columns(),
             from_ground=self.autopilot.from_ground,
             gain_sets=self.autopilot.gain_sets,
             settings=self._settings,
-            starts=self._starts,
-            ends=[*self._ends, *self._landings],
-            landings=self._landings,
+            events=self._events,
             armed=spans_of(self._arming) or None,
             blocks=list(self._commanded_blocks()),
             notes=tuple(self._notes()),
         )
 
-    def _channels(self) -> dict[str, Samples]:
-        channels = {"altitude_m": np.array(self._altitude_m), "climb_rate_m_s": np.array(self._climb_rate_m_s)}
+    def _columns(self) -> dict[str, Column]:
+        if not self._time_s:
+            return {}
+        rows = increasing(np.array(self._time_s))
+        time_s = np.array(self._time_s)[rows]
+        columns = {
+            "altitude_m": Column(time_s, np.array(self._altitude_m)[rows], "LOCAL_POSITION_NED.z"),
+            "climb_rate_m_s": Column(time_s, np.array(self._climb_rate_m_s)[rows], "LOCAL_POSITION_NED.vz"),
+        }
         if self._battery:
-            times, volts = np.array(self._battery).T
-            channels["battery_v"] = np.interp(np.array(self._time_s), times, volts)
+            columns["battery_v"] = Column(*np.array(self._battery).T, "SYS_STATUS.voltage_battery")
         if self._throttle:
-            times, shares = np.array(self._throttle).T
-            channels["throttle"] = held(times, shares, np.array(self._time_s), longest_s=THROTTLE_HOLDS_S)
-        return channels
+            columns["throttle"] = Column(*np.array(self._throttle).T, "VFR_HUD.throttle", THROTTLE_HOLDS_S)
+        return columns
 
     def _notes(self) -> Iterator[str]:
         if self._restarts:
@@ -242,7 +236,7 @@ class _Telemetry:
             return
         armed, mode = bool(int(message.base_mode) & _ARMED), int(message.custom_mode)
         if self._armed and not armed:
-            self._landings.append(LogEvent(self._now_s, "motors off"))
+            self._events.append(Event(EventKind.MOTORS_OFF, self._now_s, "motors off"))
         if self._mode not in {None, mode} and self._armed:
             self._mode_changed(mode)
         self._arming.append((self._heard_s if armed else self._now_s, armed))  # it armed since the heartbeat before
@@ -252,9 +246,9 @@ class _Telemetry:
         main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
         if self.autopilot.has_takeoff_mode and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
             if sub == _PX4_TAKEOFF_MODE:
-                self._starts.append(LogEvent(self._now_s, "takeoff mode"))
+                self._events.append(Event(EventKind.TAKEOFF, self._now_s, "takeoff mode"))
             return
-        self._ends.append(LogEvent(self._now_s, f"mode {sub or mode}"))
+        self._events.append(Event(EventKind.MODE, self._now_s, f"mode {sub or mode}"))
 
     def _status(self, message: _Message) -> None:
         millivolt = int(message.voltage_battery)
@@ -268,7 +262,7 @@ class _Telemetry:
 
     def _set_mode(self, message: _Message) -> None:
         if not self._is_vehicle(message):
-            self._ends.append(LogEvent(self._now_s, "SET_MODE"))
+            self._events.append(Event(EventKind.COMMAND, self._now_s, "SET_MODE"))
 
     def _parameter(self, message: _Message) -> None:
         name, value = str(message.param_id), float(message.param_value)
@@ -280,7 +274,7 @@ class _Telemetry:
             if self._asked.get(gain) == value:
                 del self._asked[gain]
         elif name in ("kil_thr", "aut_kil_thr") and value:
-            self._landings.append(LogEvent(self._now_s, "motors off"))
+            self._events.append(Event(EventKind.MOTORS_OFF, self._now_s, "motors off"))
 
     def _parameter_asked(self, message: _Message) -> None:
         name, value = str(message.param_id), float(message.param_value)
@@ -296,15 +290,14 @@ class _Telemetry:
             number == _SET_MODE and self.autopilot.has_takeoff_mode and message.param3 == _PX4_TAKEOFF_MODE
         )
         lands = number == _LAND or (number == _MOTORS and not message.param1)
-        if takeoff:
-            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_command_name(number)}"), self._starts)
-        elif lands or number == _SET_MODE:
-            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_command_name(number)}"), self._ends)
+        if takeoff or lands or number == _SET_MODE:
+            kind = EventKind.TAKEOFF if takeoff else EventKind.COMMAND
+            self._sent[number] = Event(kind, self._now_s, f"the command {_command_name(number)}")
 
     def _answer(self, message: _Message) -> None:
         sent = self._sent.pop(int(message.command), None) if self._is_vehicle(message) else None
         if sent is not None and message.result in _ACCEPTED:
-            sent.moments.append(sent.moment)
+            self._events.append(sent)
 
     def _block(self, message: _Message) -> None:
         if self._is_vehicle(message):

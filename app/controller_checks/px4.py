@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.px4.replica_check import read_px4_log
+from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.replica_check import px4_loop_log
 from app.autopilots.px4.trace import is_px4_trace, read_px4_trace
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
@@ -64,7 +65,7 @@ def _recognises(beginning: Beginning) -> bool:
 
 def _examine(recording: Recording) -> Result:
     if is_ulog(recording.beginning.raw):
-        compared = _compared(read_px4_log(recording.stream, name=recording.name))
+        compared = _compared(px4_loop_log(read_px4(recording.stream), name=recording.name))
         if not compared.recorded:
             raise InputError(
                 f"{recording.name} cannot be compared with the replica.",

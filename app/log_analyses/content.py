@@ -6,7 +6,8 @@ from typing import Final
 from app.autopilots.ardupilot.flight import read_ardupilot_flight
 from app.autopilots.copter_tlog import is_copter_tlog, read_copter_tlog
 from app.autopilots.paparazzi.log import is_paparazzi
-from app.autopilots.px4.flight import read_px4_flight
+from app.autopilots.px4.flight import px4_flight
+from app.autopilots.px4.log import read_px4
 from app.autopilots.readers import HEAD_BYTES, read_takeoffs
 from app.autopilots.takeoffs import Takeoff
 from app.core.analysis.analysis import analyze
@@ -32,7 +33,7 @@ _OTHER_FILES: Final = (
 """First bytes of files that are no log, but contain one."""
 _FLIGHTS: Final = (
     (is_dataflash, read_ardupilot_flight),
-    (is_ulog, read_px4_flight),
+    (is_ulog, lambda stream, *, name: px4_flight(read_px4(stream), name=name)),
     (is_copter_tlog, read_copter_tlog),
 )
 

@@ -9,7 +9,8 @@ import pytest
 
 from app.autopilots.ardupilot.flight import read_ardupilot_flight
 from app.autopilots.copter_tlog import read_copter_tlog
-from app.autopilots.px4.flight import read_px4_flight
+from app.autopilots.px4.flight import px4_flight
+from app.autopilots.px4.log import read_px4
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.prediction import FlightModel
@@ -21,7 +22,11 @@ from tests.logs.recorded import recorded
 
 pytestmark = compiled_only
 
-READERS = {"bin": read_ardupilot_flight, "tlog": read_copter_tlog, "ulg": read_px4_flight}
+READERS = {
+    "bin": read_ardupilot_flight,
+    "tlog": read_copter_tlog,
+    "ulg": lambda stream, name: px4_flight(read_px4(stream), name=name),
+}
 SITL: Mapping[str, float] = {"hover_throttle": 0.365, "thrust_slope": 1.0, "motor_lag_s": 0.0, "drag_1_s": 0.295}
 SIH: Mapping[str, float] = {"hover_throttle": 0.490, "thrust_slope": 1.0, "motor_lag_s": 0.05}
 """The vehicles of both simulations, by a regression of the acceleration in still air, and their own source. The drag of

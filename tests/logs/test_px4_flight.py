@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.autopilots.px4.flight import read_px4_flight
+from app.autopilots.px4.flight import px4_flight
+from app.autopilots.px4.log import read_px4
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import Segment
@@ -41,7 +42,7 @@ def logged() -> Segment:
 
 
 def read(content: bytes) -> LoggedFlight:
-    return read_px4_flight(io.BytesIO(content), name="flight.ulg")
+    return px4_flight(read_px4(io.BytesIO(content)), name="flight.ulg")
 
 
 def loop_of(flight: LoggedFlight) -> Px4Loop:

@@ -10,14 +10,10 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Rows, beside
 from app.autopilots.segments import (
     LARGEST_LEAN,
-    LONGEST_INTERVAL_S,
     SHORTEST_PART_S,
-    ParameterHistory,
-    Parameters,
-    Rows,
-    beside,
     choose_parts,
     jumps,
     thinned,

@@ -1,4 +1,4 @@
-"""Takeoffs in ArduPilot's on-board logs (.bin)."""
+"""ArduPilot's on-board log (.bin) to a `Recording`: which message and column means what."""
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
@@ -7,94 +7,89 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.autopilots.takeoffs import FlightLog, LogEvent, Setting
-from app.core.records.trajectory import Samples
-from app.logs.base import ARDUPILOT_SETS, Table, contents, names_in, numbers, refused, rows_of
-from app.logs.dataflash import parameters_in, read_tables, seconds
+from app.autopilots.recording import (
+    Event,
+    EventKind,
+    GainSets,
+    LoggedGain,
+    Recording,
+    Setting,
+    Source,
+    columns_of,
+    names_in,
+    own_names,
+)
+from app.core.control.ardupilot_parameters import GAINS, NEWER_NAMES
+from app.logs.base import Table, contents, numbers, rows_of
+from app.logs.dataflash import parameters_in, read_tables
 
-_TAKEOFF, _LAND = 22, 21
+GAIN_SETS: Final[GainSets] = (
+    own_names(*GAINS),
+    tuple(LoggedGain(newer, older, 1.0 / factor) for newer, (older, factor) in NEWER_NAMES.items() if older in GAINS),
+)
+"""Until 4.6, and from 4.7 on."""
+
+_COMMANDS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
+    {22: (EventKind.TAKEOFF, "NAV_TAKEOFF"), 21: (EventKind.COMMAND, "NAV_LAND")}
+)
 _ACCEPTED: Final = (0, 5)
-_LANDINGS: Final[Mapping[float, str]] = MappingProxyType({11: "motors off", 18: "the landing"})
+_EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
+    {11: (EventKind.MOTORS_OFF, "motors off"), 18: (EventKind.LANDING, "the landing")}
+)
 _MODES: Final[Mapping[float, str]] = MappingProxyType(
     {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
 )
 
 _WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"})
-_HINT: Final = "Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN)."
+_COMMON: Final = {"thrust": Source("CTUN", "ThO"), "battery_v": Source("BAT", "Volt")}
+_FROM_LOOP: Final = {
+    "altitude_m": Source("PSCD", "PD", -1.0),
+    "reference_m": Source("PSCD", "TPD", -1.0),
+    "climb_rate_m_s": Source("PSCD", "VD", -1.0),
+    **_COMMON,
+}
+_FROM_TUNING: Final = {"altitude_m": Source("CTUN", "Alt"), "reference_m": Source("CTUN", "DAlt"), **_COMMON}
 
 
-def read_dataflash(stream: BinaryIO) -> FlightLog:
-    """Read a whole log. Raises TrajectoryError if it contains no altitude."""
+def read_ardupilot(stream: BinaryIO) -> Recording:
+    """Decode a whole log."""
     tables = read_tables(contents(stream), _WANTED)
-    time_s, channels, title = _altitude(tables)
-    if "BAT" in tables and {"TimeUS", "Volt"} <= tables["BAT"].keys():
-        battery = _first_instance(tables["BAT"])
-        if len(battery["TimeUS"]):
-            channels["battery_v"] = np.interp(time_s, seconds(battery), numbers(battery["Volt"]))
-    starts, ends, landings = _moments(tables)
-    return FlightLog(
-        title=f"ArduPilot's on-board log, {title}",
+    sources = _FROM_LOOP if {"TimeUS", "PD"} <= tables.get("PSCD", {}).keys() else _FROM_TUNING
+    if "BAT" in tables:
+        tables["BAT"] = _first_instance(tables["BAT"])
+    columns = columns_of(tables, sources, clock="TimeUS")
+    altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
+    return Recording(
+        title=f"ArduPilot's on-board log, altitude from {altitude}",
         clock="vehicle",
-        time_s=time_s,
-        channels=channels,
+        columns=columns,
         from_ground=True,
-        gain_sets=ARDUPILOT_SETS,
+        gain_sets=GAIN_SETS,
         settings=tuple(_settings(tables)),
-        starts=starts,
-        ends=[*ends, *landings],
-        landings=landings,
+        events=list(_events(tables)),
     )
-
-
-def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples], str]:
-    """Time, channels, and their source: the vertical controller's own message if it is logged."""
-    loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
-    if {"TimeUS", "PD"} <= loop.keys():
-        time_s = seconds(loop)
-        down = {"altitude_m": "PD", "reference_m": "TPD", "climb_rate_m_s": "VD"}
-        channels = {channel: -numbers(loop[name]) for channel, name in down.items() if name in loop}
-        title = "altitude from PSCD.PD"
-    elif {"TimeUS", "Alt"} <= tuning.keys():
-        time_s = seconds(tuning)
-        up = {"altitude_m": "Alt", "reference_m": "DAlt"}
-        channels = {channel: numbers(tuning[name]) for channel, name in up.items() if name in tuning}
-        title = "altitude from CTUN.Alt"
-    else:
-        raise refused("contains neither PSCD.PD nor CTUN.Alt, the altitude", _HINT)
-    if {"TimeUS", "ThO"} <= tuning.keys() and len(tuning["TimeUS"]):
-        channels["thrust"] = np.interp(time_s, seconds(tuning), numbers(tuning["ThO"]))
-    return time_s, channels, title
 
 
 def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
     """The gains, logged at the start of the log and at every change."""
-    names = names_in(ARDUPILOT_SETS)
+    names = names_in(GAIN_SETS)
     for time_s, name, value in parameters_in(tables):
         if name in names and np.isfinite(value):
             yield Setting(time_s, name, value)
 
 
-def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
+def _events(tables: Mapping[str, Table]) -> Iterator[Event]:
     """Takeoff commands, events that end the flight, and landings."""
-    accepted = [
-        (time_s, command)
-        for time_s, command, result in rows_of(tables.get("MAVC", {}), "TimeUS", "Cmd", "Res")
-        if result in _ACCEPTED
-    ]
-    starts = [LogEvent(time_s, "the command NAV_TAKEOFF") for time_s, command in accepted if command == _TAKEOFF]
-    ends = [LogEvent(time_s, "the command NAV_LAND") for time_s, command in accepted if command == _LAND]
+    for time_s, command, result in rows_of(tables.get("MAVC", {}), "TimeUS", "Cmd", "Res"):
+        if result in _ACCEPTED and command in _COMMANDS:
+            yield Event(_COMMANDS[command][0], time_s, f"the command {_COMMANDS[command][1]}")
     modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
-    ends += [
-        LogEvent(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
-        for (_, before), (time_s, mode) in pairwise(modes)
-        if mode != before
-    ]
-    landings = [
-        LogEvent(time_s, _LANDINGS[event])
-        for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id")
-        if event in _LANDINGS
-    ]
-    return starts, ends, landings
+    for (_, before), (time_s, mode) in pairwise(modes):
+        if mode != before:
+            yield Event(EventKind.MODE, time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
+    for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id"):
+        if event in _EVENTS:
+            yield Event(_EVENTS[event][0], time_s, _EVENTS[event][1])
 
 
 def _first_instance(table: Table) -> Table:

@@ -10,17 +10,18 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise, product
+from types import MappingProxyType
 from typing import BinaryIO, Final
 from xml.parsers import expat
 
 import numpy as np
 
-from app.autopilots.takeoffs import FlightLog, LogEvent, Setting
+from app.autopilots.recording import Column, Event, EventKind, GainSets, Recording, Setting, increasing, own_names
 from app.core.control.loop_log import FIELDS, GAINS, FlownGains, LoopLog, flown_gains
 from app.core.control.paparazzi import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
-from app.logs.base import PAPARAZZI_SETS, refused
+from app.logs.base import refused
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20
 _MAX_SAMPLES: Final = 2_000_000
@@ -32,6 +33,10 @@ _SETTINGS: Final = 256
 _MOST_CANDIDATES: Final = 32
 _PLATEAU_S: Final = 2.0
 
+PARAMETERS: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
+"""Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
+GAIN_SETS: Final[GainSets] = (own_names(*GAINS),)
+
 _WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
 _HINT: Final = "Use the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
 
@@ -41,7 +46,7 @@ def is_paparazzi(head: bytes) -> bool:
     return bool(_LINE.match(head))
 
 
-def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> FlightLog:
+def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Recording:
     """Read a .data file and its companion, if given. The gains are those that the loop's commands follow from; without
     VERT_LOOP those in the companion, as far as they are certain.
 
@@ -49,22 +54,20 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
     """
     lines = _read(stream)
     configuration = _configuration(companion, lines)
-    time_s, channels = _altitude(lines)
+    columns = _columns(lines)
     loop = lines.loop_log() if lines.loop_time_s else None
     flown = [] if loop is None else flown_gains(loop, configuration.candidates)
     notes = list(configuration.notes(flown))
     if lines.others:
         notes.append(f"other aircraft in the log left out: {', '.join(sorted(lines.others)[:5])}")
-    return FlightLog(
+    return Recording(
         title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
         clock="ground",
-        time_s=time_s,
-        channels=channels,
+        columns=columns,
         from_ground=False,
-        gain_sets=PAPARAZZI_SETS,
+        gain_sets=GAIN_SETS,
         settings=list(configuration.settings(flown)),
-        starts=[] if loop is None else _starts(loop),
-        ends=[] if loop is None else _ends(loop),
+        events=[] if loop is None else [*_starts(loop), *_ends(loop)],
         notes=tuple(notes),
     )
 
@@ -165,17 +168,22 @@ def _float(text: bytes) -> float:
         return np.nan
 
 
-def _altitude(lines: _Lines) -> tuple[Samples, dict[str, Samples]]:
-    """Time and channels, from the more frequent message. Raises TrajectoryError if there is neither."""
+def _columns(lines: _Lines) -> dict[str, Column]:
+    """Columns of the loop, and of the position if its message is more frequent. Raises TrajectoryError if there is
+    neither."""
     if not lines.loop_time_s and not lines.time_s:
         raise refused("contains neither VERT_LOOP nor ROTORCRAFT_FP", _HINT)
-    loop = _loop_channels(lines.loop_log()) if lines.loop_time_s else {}
+    log = lines.loop_log()
+    loop = _loop_channels(log) if lines.loop_time_s else {}
+    columns = {name: Column(log.time_s, values, "VERT_LOOP") for name, values in loop.items()}
     if len(lines.loop_time_s) >= len(lines.time_s):
-        return lines.loop_log().time_s, loop
-    time_s = np.array(lines.time_s)
-    rarer = {name: np.interp(time_s, lines.loop_log().time_s, values) for name, values in loop.items()}
-    position = {"altitude_m": np.array(lines.up) / 2**8, "climb_rate_m_s": np.array(lines.up_speed) / 2**19}
-    return time_s, rarer | position
+        return columns
+    rows = increasing(np.array(lines.time_s))
+    time_s = np.array(lines.time_s)[rows]
+    return columns | {
+        "altitude_m": Column(time_s, np.array(lines.up)[rows] / 2**8, "ROTORCRAFT_FP.up"),
+        "climb_rate_m_s": Column(time_s, np.array(lines.up_speed)[rows] / 2**19, "ROTORCRAFT_FP.vup"),
+    }
 
 
 def _loop_channels(log: LoopLog) -> dict[str, Samples]:
@@ -191,23 +199,25 @@ def _loop_channels(log: LoopLog) -> dict[str, Samples]:
     }
 
 
-def _starts(log: LoopLog) -> list[LogEvent]:
+def _starts(log: LoopLog) -> list[Event]:
     """The last samples before the reference starts to move by itself."""
     idle = log.idle
     sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
-    return [LogEvent(float(log.time_s[place]), "the reference starting to move") for place in sets_out]
+    return [Event(EventKind.TAKEOFF, float(log.time_s[place]), "the reference starting to move") for place in sets_out]
 
 
-def _ends(log: LoopLog) -> list[LogEvent]:
+def _ends(log: LoopLog) -> list[Event]:
     """Times at which a set point that was held for two seconds changes, or the loop becomes inactive."""
     idle, set_point = log.idle, log["z_sp"]
     stops = np.flatnonzero(~idle[:-1] & idle[1:])
-    moments = [LogEvent(float(log.time_s[place]), "the loop being switched off") for place in stops]
+    moments = [Event(EventKind.COMMAND, float(log.time_s[place]), "the loop being switched off") for place in stops]
     held_since_s = float(log.time_s[0])
     for place in np.flatnonzero(np.diff(set_point) != 0).tolist():
         now_s, is_working = float(log.time_s[place]), not idle[place] and not idle[place + 1]
         if is_working and now_s - held_since_s >= _PLATEAU_S:
-            moments.append(LogEvent(now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m"))
+            moments.append(
+                Event(EventKind.COMMAND, now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m")
+            )
         held_since_s = float(log.time_s[place + 1])
     return moments
 
