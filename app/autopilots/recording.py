@@ -25,9 +25,11 @@ Parameters = Mapping[str, float]
 
 
 class EventKind(StrEnum):
-    """What happened: a command or mode that begins a takeoff, another command or mode, leaving the ground, reaching it,
-    the motors being switched off, a parameter becoming another, the end of what is recorded."""
+    """What happened: the vehicle starting anew, its clock going on some time later; a command or mode that begins a
+    takeoff, another command or mode; leaving the ground, reaching it, the motors being switched off; a parameter
+    becoming another, the end of what is recorded."""
 
+    BOOT = "boot"
     TAKEOFF = "takeoff"
     COMMAND = "command"
     MODE = "mode"
@@ -124,6 +126,10 @@ class Column:
             return np.interp(time_s, self.time_s, self.values)
         return held(self.time_s, self.values, time_s, longest_s=self.holds_s)
 
+    def beside(self, time_s: Samples) -> Samples:
+        """The quantity between two reports that are near to each other, shape (m,); NaN elsewhere."""
+        return beside(self.time_s, self.values, time_s)
+
 
 def columns_of(tables: Mapping[str, Table], sources: Mapping[str, Source], *, clock: str) -> dict[str, Column]:
     """The columns that were logged, in order of time, those of a message at the same `time_s`; `clock` is the field
@@ -187,6 +193,7 @@ class Recording:
 
     title: str
     clock: str
+    firmware: str = ""
     columns: Mapping[str, Column]
     from_ground: bool
     sources: Collection[str] = ()
@@ -214,6 +221,11 @@ class Recording:
 def names_in(sets: GainSets) -> frozenset[str]:
     """All names in these sets, as in the log."""
     return frozenset(gain.name for gains in sets for gain in gains)
+
+
+def restarts(boots: int) -> list[str]:
+    """The note on how often the vehicle started anew, if it did."""
+    return [f"the vehicle restarted and reset its clock ({boots}×)"] if boots else []
 
 
 def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:

@@ -43,12 +43,14 @@ def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Refused) -
     return usable
 
 
-def require_gains(given: Parameters, bounds: Mapping[str, tuple[float, float]], absent: str, refused: Refused) -> None:
+def require_gains(
+    given: Parameters, bounds: Mapping[str, tuple[float, float]], refused: Refused, absent: Callable[[str], str]
+) -> None:
     """Require that the loop had all gains of the search, positive where the search has no zero. Raises what `refused`
-    makes of the gain and the reason, `absent` if it is missing."""
+    makes of the gain and the reason; `absent` gives that of one that is missing."""
     for each, (least, _) in bounds.items():
         if each not in given:
-            raise refused(each, absent)
+            raise refused(each, absent(each))
         if given[each] < 0.0 or (least and not given[each]):
             raise refused(each, f"must be positive, got {given[each]:g}")
 

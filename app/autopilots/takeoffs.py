@@ -35,7 +35,7 @@ _COMMAND_AHEAD_S: Final = 10.0
 _LISTED: Final = 50
 _LARGEST: Final = 1e6
 _LANDINGS: Final = (EventKind.LANDING, EventKind.MOTORS_OFF)
-_ENDS: Final = (EventKind.COMMAND, EventKind.MODE, *_LANDINGS)
+_ENDS: Final = (EventKind.COMMAND, EventKind.MODE, *_LANDINGS, EventKind.BOOT)
 _ALTITUDES: Final = frozenset({"altitude_m", "reference_m", "set_point_m"})
 
 

@@ -6,7 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.replica_check import read_ardupilot_log
+from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
@@ -46,7 +47,7 @@ def _recognises(beginning: Beginning) -> bool:
 def _examine(recording: Recording) -> Result:
     stream, name = recording.stream, recording.name
     if is_dataflash(recording.beginning.raw):
-        compared = _compared(read_ardupilot_log(stream, name=name))
+        compared = _compared(ardupilot_loop_log(read_ardupilot(stream), name=name))
         return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
     return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(stream, name=name)))
 

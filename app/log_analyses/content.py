@@ -3,7 +3,8 @@
 import io
 from typing import Final
 
-from app.autopilots.ardupilot.flight import read_ardupilot_flight
+from app.autopilots.ardupilot.flight import ardupilot_flight
+from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.copter_tlog import is_copter_tlog, read_copter_tlog
 from app.autopilots.paparazzi.log import is_paparazzi
 from app.autopilots.px4.flight import px4_flight
@@ -32,7 +33,7 @@ _OTHER_FILES: Final = (
 )
 """First bytes of files that are no log, but contain one."""
 _FLIGHTS: Final = (
-    (is_dataflash, read_ardupilot_flight),
+    (is_dataflash, lambda stream, *, name: ardupilot_flight(read_ardupilot(stream), name=name)),
     (is_ulog, lambda stream, *, name: px4_flight(read_px4(stream), name=name)),
     (is_copter_tlog, read_copter_tlog),
 )

@@ -7,7 +7,8 @@ from functools import cache
 
 import pytest
 
-from app.autopilots.ardupilot.flight import read_ardupilot_flight
+from app.autopilots.ardupilot.flight import ardupilot_flight
+from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.copter_tlog import read_copter_tlog
 from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
@@ -23,7 +24,7 @@ from tests.logs.recorded import recorded
 pytestmark = compiled_only
 
 READERS = {
-    "bin": read_ardupilot_flight,
+    "bin": lambda stream, name: ardupilot_flight(read_ardupilot(stream), name=name),
     "tlog": read_copter_tlog,
     "ulg": lambda stream, name: px4_flight(read_px4(stream), name=name),
 }

@@ -97,7 +97,7 @@ def px4_flight(recording: Recording, *, name: str) -> LoggedFlight:
             f"has no {SHORTEST_PART_S:g} s with an altitude to follow between takeoff and landing, without a gap of "
             f"{LONGEST_INTERVAL_S:g} s, a reset of the estimator or a parameter change",
         )
-    require_gains(given, SPACE.bounds, "is missing", refused)
+    require_gains(given, SPACE.bounds, refused, lambda _: "is missing")
     parameters = parameters_from(given)
     limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
     hover = _hover(rows, acceleration_target, is_sound & (thrust > limits[0]) & (thrust < limits[1]))
