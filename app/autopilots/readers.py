@@ -6,17 +6,22 @@ from io import BytesIO
 from pathlib import PurePath
 from typing import BinaryIO, Final
 
+from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.copter_tlog import copter_steps
 from app.autopilots.paparazzi.log import is_paparazzi, read_paparazzi
+from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
 from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
+from app.autopilots.tlog import HINT as TLOG_HINT
 from app.autopilots.tlog import read_tlog
+from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.logs.base import refused
 from app.logs.dataflash import is_dataflash
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.logs.tlog_frames import is_tlog
+from app.logs.tlog import is_tlog
 from app.logs.ulog_tables import HINT as ULOG_HINT
 from app.logs.ulog_tables import is_ulog
 
@@ -26,15 +31,23 @@ _COMPANION: Final = ".log"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
-    """One kind of log: its file suffix and title, a test of its first bytes, and the function that reads it.
-    `altitude` are the messages that have it, and `hint` says which log to use where it has none."""
+    """One kind of log: its file suffix and title, a test of its first bytes, the function that decodes it, and the one
+    that gives the flight in it that can be analysed, None if its takeoffs are. `altitude` are the messages that have
+    it, and `hint` says which log to use where it has none."""
 
     suffix: str
     title: str
     recognises: Callable[[bytes], bool]
     read: Callable[[BinaryIO, BinaryIO | None], Recording]
+    flight: Callable[[Recording, str], LoggedFlight | None]
     altitude: str = ""
     hint: str = ""
+
+    def takeoffs(self, recording: Recording) -> Sequence[Takeoff]:
+        """Every takeoff. Raises TrajectoryError if there is none, or no altitude."""
+        if "altitude_m" not in recording.columns:
+            raise refused(f"contains {self.altitude}", self.hint)
+        return find_takeoffs(recording)
 
 
 def _alone(read: Callable[[BinaryIO], Recording]) -> Callable[[BinaryIO, BinaryIO | None], Recording]:
@@ -48,15 +61,16 @@ READERS: Final = (
         title="MAVLink telemetry log",
         recognises=is_tlog,
         read=_alone(read_tlog),
+        flight=copter_steps,
         altitude="no LOCAL_POSITION_NED of the vehicle",
-        hint="Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
-        "contain the ground station's commands.",
+        hint=TLOG_HINT,
     ),
     Reader(
         suffix=".bin",
         title="ArduPilot's on-board log",
         recognises=is_dataflash,
         read=_alone(read_ardupilot),
+        flight=ardupilot_flight,
         altitude="neither PSCD.PD nor CTUN.Alt, the altitude",
         hint="Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN).",
     ),
@@ -65,13 +79,25 @@ READERS: Final = (
         title="PX4's log",
         recognises=is_ulog,
         read=_alone(read_px4),
+        flight=px4_flight,
         altitude="no vehicle_local_position.z, the altitude",
         hint=ULOG_HINT,
     ),
-    Reader(suffix=".data", title="Paparazzi's ground log", recognises=is_paparazzi, read=read_paparazzi),
+    Reader(
+        suffix=".data",
+        title="Paparazzi's ground log",
+        recognises=is_paparazzi,
+        read=read_paparazzi,
+        flight=lambda _recording, _name: None,
+    ),
 )
 
 SUFFIXES: Final = (".csv", *(reader.suffix for reader in READERS))
+
+
+def reader_of(head: bytes) -> Reader | None:
+    """The reader of a file with these first bytes; None if it is no log."""
+    return next((reader for reader in READERS if reader.recognises(head)), None)
 
 
 def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | None = None) -> Sequence[Takeoff]:
@@ -83,12 +109,8 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     stream.seek(0)
     head = stream.read(HEAD_BYTES)
     stream.seek(0)
-    reader = next((reader for reader in READERS if reader.recognises(head)), None)
-    if reader is not None:
-        recording = reader.read(stream, companion)
-        if "altitude_m" not in recording.columns:
-            raise refused(f"contains {reader.altitude}", reader.hint)
-        return find_takeoffs(recording)
+    if (reader := reader_of(head)) is not None:
+        return reader.takeoffs(reader.read(stream, companion))
     suffix = PurePath(name).suffix.lower()
     if suffix == _COMPANION:
         raise TrajectoryError(

@@ -60,11 +60,12 @@ class Span:
 @dataclass(frozen=True, slots=True)
 class Setting:
     """A parameter that the vehicle used from this time on, −∞ if from before the recording; NaN if it is unknown from
-    then on."""
+    then on. `held_before`: it is reported for the first time, and nobody had written it before in the recording."""
 
     time_s: float
     name: str
     value: float
+    held_before: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +132,11 @@ class Column:
         return beside(self.time_s, self.values, time_s)
 
 
-def columns_of(tables: Mapping[str, Table], sources: Mapping[str, Source], *, clock: str) -> dict[str, Column]:
+def columns_of(
+    tables: Mapping[str, Table], sources: Mapping[str, Source], *, clock: str, ticks_per_s: float = 1e6
+) -> dict[str, Column]:
     """The columns that were logged, in order of time, those of a message at the same `time_s`; `clock` is the field
-    with the time in µs.
+    with the time.
 
     Reports older than one before them are left out. Of several at the same time the first counts, or for a state the
     last.
@@ -145,7 +148,7 @@ def columns_of(tables: Mapping[str, Table], sources: Mapping[str, Source], *, cl
         if {clock, source.field} <= table.keys() and len(table[clock]):
             is_state = source.holds_s is not None
             if (source.message, is_state) not in orders:
-                at_s = numbers(table[clock]) / 1e6
+                at_s = numbers(table[clock]) / ticks_per_s
                 rows = _latest(at_s) if is_state else increasing(at_s)
                 orders[source.message, is_state] = at_s[rows], rows
             time_s, rows = orders[source.message, is_state]
@@ -181,10 +184,11 @@ class ParameterHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """A recording of one vehicle.
+    """A recording of one vehicle, `system` in MAVLink, under an `autopilot`: ardupilot, px4, paparazzi.
 
-    `sources` are the messages that it has, known or not; columns are of those. `from_ground`: its altitude is to be
-    measured from where the vehicle stood. `gain_sets` are the gains of its autopilot by the names of each release; the
+    `firmware` and `frame` are named if they are not those of a copter with several rotors. `sources` are the messages
+    that it has, of which some are columns. `from_ground`: its altitude is to be measured from where the vehicle stood.
+    `gain_sets` are the gains of its autopilot by the names of each release; the
     first set whose names are all in `settings` applies. `in_air` are the intervals from lift-off to touchdown, `armed`
     those with the motors armed, both as reported by the autopilot and in order; None if it does not report them.
     `blocks` are the intervals in blocks of a flight plan, each from the command that activated it. `notes` say what was
@@ -192,13 +196,17 @@ class Recording:
     """
 
     title: str
+    autopilot: str
     clock: str
+    system: int = 1
     firmware: str = ""
+    frame: str = ""
     columns: Mapping[str, Column]
     from_ground: bool
     sources: Collection[str] = ()
     gain_sets: GainSets = ()
     settings: Sequence[Setting] = ()
+    has_all_parameters: bool = True
     events: Sequence[Event] = ()
     in_air: Sequence[Span] | None = None
     armed: Sequence[Span] | None = None
@@ -243,13 +251,14 @@ def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:
 
 def increasing(at_s: Samples) -> NDArray[np.int64]:
     """Rows, shape (k,), each later than all before it."""
-    return np.flatnonzero(np.diff(np.fmax.accumulate(at_s), prepend=-np.inf) > 0.0)
+    latest = np.fmax.accumulate(at_s)
+    return np.flatnonzero(np.append(~np.isnan(at_s[:1]), latest[1:] > latest[:-1]))
 
 
 def _latest(at_s: Samples) -> NDArray[np.int64]:
     """The last row, shape (k,), of each time that is later than all before it."""
     kept = np.flatnonzero(at_s >= np.fmax.accumulate(at_s))
-    return kept[np.append(np.diff(at_s[kept]) > 0.0, np.ones(len(kept[:1]), dtype=np.bool_))]
+    return kept[np.append(at_s[kept[1:]] > at_s[kept[:-1]], np.ones(len(kept[:1]), dtype=np.bool_))]
 
 
 def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:

@@ -1,17 +1,19 @@
-"""Reader of telemetry logs (.tlog): both directions of a MAVLink connection, each frame preceded by its time in µs.
+"""Telemetry logs (.tlog) to a `Recording`: what the vehicle reports, and what ground stations ask of it.
 
-Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock, the takeoff from the ground station's
-command (a block with such a name, or else the one in which it lifted off; NAV_TAKEOFF, the takeoff mode), the gains
-from the vehicle's replies.
+Such a log has both directions of a connection, often of several vehicles, components and ground stations; messages may
+be lost, late or repeated, and the vehicle may restart. Time is the vehicle's own clock: messages without one are dated
+by the last message that has one. A takeoff begins with the ground station's command (a block with such a name, or else
+the one in which it lifted off; NAV_TAKEOFF, the takeoff mode); parameters are those that the vehicle replies with.
 """
 
 import importlib
 import struct
 from array import array
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType, ModuleType
-from typing import BinaryIO, Final, Protocol
+from typing import BinaryIO, Final
 
 import numpy as np
 
@@ -20,55 +22,81 @@ from app.autopilots.paparazzi.log import GAIN_SETS as PAPARAZZI_SETS
 from app.autopilots.paparazzi.log import PARAMETERS
 from app.autopilots.px4.log import GAIN_SETS as PX4_SETS
 from app.autopilots.recording import (
-    Column,
+    LONGEST_INTERVAL_S,
     Event,
     EventKind,
     GainSets,
     Recording,
     Setting,
+    Source,
     Span,
-    increasing,
+    columns_of,
     names_in,
+    restarts,
     spans_of,
 )
 from app.core.records.trajectory import THROTTLE_HOLDS_S
-from app.logs.base import Contents, contents, refused
-from app.logs.tlog_frames import frames, is_whole, payload_of
+from app.logs.base import Contents, Table, contents, refused
+from app.logs.tlog import Message, frames, messages
 
-_POSITION: Final = struct.Struct("<I6f")
-_RESTART_S: Final = 1.0
-_ARMED: Final = 128
-_ACCEPTED: Final = (0, 5)
-_MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
-_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
-
-_HINT: Final = (
+HINT: Final = (
     "Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
     "contain the ground station's commands."
 )
+SOURCES: Final[Mapping[str, Source]] = {
+    "altitude_m": Source("LOCAL_POSITION_NED", "z", -1.0),
+    "climb_rate_m_s": Source("LOCAL_POSITION_NED", "vz", -1.0),
+    "demanded_throttle": Source("ATTITUDE_TARGET", "thrust"),
+    "lean": Source("ATTITUDE_TARGET", "lean"),
+    "target_altitude_m": Source("POSITION_TARGET_LOCAL_NED", "z", -1.0, holds_s=LONGEST_INTERVAL_S),
+    "reference_error_m": Source("NAV_CONTROLLER_OUTPUT", "alt_error"),
+    "is_armed": Source("HEARTBEAT", "armed", holds_s=np.inf),
+    "mode": Source("HEARTBEAT", "custom_mode", holds_s=np.inf),
+    "battery_v": Source("SYS_STATUS", "voltage_battery"),
+    "throttle": Source("VFR_HUD", "throttle", holds_s=THROTTLE_HOLDS_S),
+}
+"""`lean` is the cosine of the demanded lean, `reference_error_m` how far the vehicle's own reference is above it; the
+target is NaN where the vehicle flies to none, or was given a speed or an acceleration beside it."""
+_TIME: Final = "time_s"
+_FROM_ANY: Final = frozenset({"PARAM_SET", "SET_POSITION_TARGET_LOCAL_NED"})
+"""Requests that count whoever sends them; others only from another system."""
+_BACK_S: Final = 20.0
+"""If the clock goes back by less than this, and not to a time since its last message, the message was late."""
+_SHORTEST_BOOT_S: Final = 1.0
+_ARMED: Final = 128
+_ACCEPTED: Final = (0, 5)
+_MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
+_COMMANDS: Final = MappingProxyType(
+    {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}
+)
+_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
+_IGNORES_Z: Final = 4
+_IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
+_IGNORES_ATTITUDE: Final = 128
+_INTEGERS: Final = range(1, 9)
+_COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
+"""Kinds of vehicles with several rotors, in a heartbeat."""
+_OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
+    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
+)
 
 
-class _Message(Protocol):
-    """A message decoded by pymavlink: fields are attributes with the names in the dialect's definition."""
-
-    def get_srcSystem(self) -> int: ...  # noqa: N802 - pymavlink's name
-    def __getattr__(self, name: str) -> float | int | str: ...
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Autopilot:
     """Differences between autopilots.
 
-    `parameters` maps their parameter names to those of the gains. Some store gains as integers only; some have a
-    takeoff mode.
+    `parameters` maps their parameter names to those of the gains, where these differ. Some store gains as integers
+    only; some send integers byte by byte in place of a float; some have a takeoff mode.
     """
 
+    name: str
     title: str
     dialect_module: str
     gain_sets: GainSets
-    parameters: Mapping[str, str]
-    from_ground: bool
+    parameters: Mapping[str, str] | None = None
+    from_ground: bool = True
     keeps_whole_numbers: bool = False
+    sends_integers_bytewise: bool = False
     has_takeoff_mode: bool = False
 
     @property
@@ -77,17 +105,28 @@ class _Autopilot:
         return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
 
 
-def _own_names(sets: GainSets) -> Mapping[str, str]:
-    return {name: name for name in names_in(sets)}
-
-
 _AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
     {
         9: _Autopilot(
-            "Paparazzi", "v10.paparazzi", PAPARAZZI_SETS, PARAMETERS, from_ground=False, keeps_whole_numbers=True
+            name="paparazzi",
+            title="Paparazzi",
+            dialect_module="v10.paparazzi",
+            gain_sets=PAPARAZZI_SETS,
+            parameters=PARAMETERS,
+            from_ground=False,
+            keeps_whole_numbers=True,
         ),
-        3: _Autopilot("ArduPilot", "v20.ardupilotmega", ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
-        12: _Autopilot("PX4", "v20.common", PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
+        3: _Autopilot(
+            name="ardupilot", title="ArduPilot", dialect_module="v20.ardupilotmega", gain_sets=ARDUPILOT_SETS
+        ),
+        12: _Autopilot(
+            name="px4",
+            title="PX4",
+            dialect_module="v20.common",
+            gain_sets=PX4_SETS,
+            sends_integers_bytewise=True,
+            has_takeoff_mode=True,
+        ),
     }
 )
 """By the autopilot number in the heartbeat.
@@ -96,218 +135,259 @@ Paparazzi's altitude is above its local origin, that of the others above the gro
 """
 
 
+@dataclass(frozen=True, slots=True)
+class _Vehicle:
+    """A vehicle in a log: its system and component, its autopilot, and the number of its kind."""
+
+    system: int
+    component: int
+    autopilot: _Autopilot
+    kind: int
+
+
 def read_tlog(stream: BinaryIO) -> Recording:
-    """Read a whole log. Raises TrajectoryError if it contains no flight of a known vehicle."""
+    """Decode the messages of the vehicle that reports its position most often. Raises TrajectoryError if there is no
+    heartbeat of a known autopilot."""
     data = contents(stream)
-    system, autopilot = _vehicle(data)
-    conversation = _Telemetry(autopilot, system)
-    dialect = autopilot.dialect
-    decoder = dialect.MAVLink(None)
-    extra = bytes([dialect.MAVLink_local_position_ned_message.crc_extra])
-    for frame in frames(data):
-        if frame.message == dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
-            if frame.system == system and is_whole(dialect, data, frame, extra):
-                conversation.position(payload_of(data, frame, _POSITION.size), frame.stamp_s(data))
-        elif frame.message in conversation.handlers:
-            try:
-                message: _Message = decoder.decode(bytearray(data[frame.start : frame.end]))
-            except dialect.MAVError:
-                continue
-            conversation.handlers[frame.message](message)
-    return conversation.recording()
+    decoder = _Decoder(_find_vehicle(data))
+    for message in messages(data, decoder.vehicle.autopilot.dialect, {*decoder.reports, *decoder.requests}):
+        decoder.take(message)
+    return decoder.recording()
 
 
-def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
-    """The system that sends the first heartbeat of a known autopilot."""
-    for frame in frames(data):
-        if frame.message == 0 and frame.end - frame.payload >= 9:
-            autopilot = _AUTOPILOTS.get(data[frame.payload + 5])
-            if autopilot is not None:
-                return frame.system, autopilot
-    known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
-    raise refused(f"contains no MAVLink heartbeat of {known}", _HINT)
+def _find_vehicle(data: Contents) -> _Vehicle:
+    from pymavlink.dialects.v20 import common  # a thousand classes
+
+    found: dict[tuple[int, int], _Vehicle] = {}
+    for message in messages(data, common, {"HEARTBEAT"}):
+        place, autopilot = (message.system, message.component), _AUTOPILOTS.get(int(message["autopilot"]))
+        if autopilot is not None and place not in found:
+            found[place] = _Vehicle(*place, autopilot, int(message["type"]))
+    if not found:
+        known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
+        raise refused(f"contains no MAVLink heartbeat of {known}", HINT)
+    number = common.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+    positions = Counter((frame.system, frame.component) for frame in frames(data) if frame.message == number)
+    return max(found.values(), key=lambda each: positions[each.system, each.component])
 
 
 @dataclass(slots=True)
-class _Telemetry:
-    """Messages of ground station and vehicle, in the vehicle's time, dated by the last position."""
+class _Clock:
+    """Seconds since the vehicle's first boot in the log; a restart goes on in the ground's time."""
 
-    autopilot: _Autopilot
-    system: int
-    handlers: dict[int, Callable[[_Message], None]] = field(init=False)
-    _now_s: float = -np.inf
-    _offset_s: float = 0.0
+    now_s: float = -np.inf
+    restarts: list[Event] = field(default_factory=list)
+    _ahead_s: float = 0.0
     _stamp_s: float = 0.0
-    _restarts: int = 0
-    _time_s: "array[float]" = field(default_factory=lambda: array("d"))
-    _altitude_m: "array[float]" = field(default_factory=lambda: array("d"))
-    _climb_rate_m_s: "array[float]" = field(default_factory=lambda: array("d"))
-    _battery: list[tuple[float, float]] = field(default_factory=list)
-    _throttle: list[tuple[float, float]] = field(default_factory=list)
+
+    def at(self, boot_ms: float, stamp_s: float) -> float:
+        time_s, elapsed_s = boot_ms / 1000 + self._ahead_s, stamp_s - self._stamp_s
+        has_just_booted = boot_ms / 1000 <= elapsed_s + _SHORTEST_BOOT_S
+        if time_s < self.now_s - (_SHORTEST_BOOT_S if has_just_booted else _BACK_S):
+            self._ahead_s += self.now_s + max(elapsed_s, _SHORTEST_BOOT_S) - time_s
+            time_s = boot_ms / 1000 + self._ahead_s
+            self.restarts.append(Event(EventKind.BOOT, time_s, "the vehicle restarting"))
+        self.now_s, self._stamp_s = max(self.now_s, time_s), stamp_s
+        return time_s
+
+
+def _numbers() -> "array[float]":
+    return array("d")
+
+
+@dataclass(slots=True)
+class _Decoder:
+    """Messages of ground stations and the vehicle, in order of receipt."""
+
+    vehicle: _Vehicle
+    reports: Mapping[str, Callable[[Message], None]] = field(init=False)
+    requests: Mapping[str, Callable[[Message], None]] = field(init=False)
+    _clock: _Clock = field(default_factory=_Clock)
+    _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(_numbers))
     _blocks: dict[int, str] = field(default_factory=dict)
     _activated: list[tuple[float, int]] = field(default_factory=list)
     _entered: list[tuple[float, int]] = field(default_factory=list)
     _settings: list[Setting] = field(default_factory=list)
+    _known: set[str] = field(default_factory=set)
+    _written: set[str] = field(default_factory=set)
+    _parameters: int = 0
     _asked: dict[str, float] = field(default_factory=dict)
     _sent: dict[int, Event] = field(default_factory=dict)
     _events: list[Event] = field(default_factory=list)
-    _armed: bool = False
     _arming: list[tuple[float, bool]] = field(default_factory=list)
     _heard_s: float = -np.inf
     _mode: int | None = None
+    _is_fed: bool = False
+    """Whether the last position target for it has more than a position, which it does not report."""
 
     def __post_init__(self) -> None:
-        by_name = {
+        self.reports = {
             "HEARTBEAT": self._heartbeat,
-            "SYS_STATUS": self._status,
-            "VFR_HUD": self._reported_throttle,
-            "SET_MODE": self._set_mode,
+            "LOCAL_POSITION_NED": self._position,
+            "ATTITUDE_TARGET": self._attitude_target,
+            "POSITION_TARGET_LOCAL_NED": self._position_target,
+            "NAV_CONTROLLER_OUTPUT": self._reference_error,
+            "SYS_STATUS": self._battery,
+            "VFR_HUD": self._throttle,
             "PARAM_VALUE": self._parameter,
-            "PARAM_SET": self._parameter_asked,
-            "COMMAND_INT": self._command,
-            "COMMAND_LONG": self._command,
             "COMMAND_ACK": self._answer,
             "SCRIPT_ITEM": self._block,
             "SCRIPT_CURRENT": self._block_entered,
         }
-        dialect = self.autopilot.dialect
-        numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
-        self.handlers = {number: by_name[name] for name, number in numbers.items() if number is not None}
+        self.requests = {
+            "PARAM_SET": self._parameter_asked,
+            "SET_POSITION_TARGET_LOCAL_NED": self._position_asked,
+            "SET_MODE": self._mode_asked,
+            "COMMAND_INT": self._command,
+            "COMMAND_LONG": self._command,
+            "SCRIPT_ITEM": self._block_asked,
+        }
 
-    def position(self, payload: bytes, stamp_s: float) -> None:
-        boot_ms, _, _, down_m, _, _, down_m_s = _POSITION.unpack(payload)
-        now_s = boot_ms / 1000 + self._offset_s
-        if now_s < self._now_s - _RESTART_S:  # the vehicle's clock restarted: continue with the ground's
-            self._offset_s += self._now_s - now_s + max(stamp_s - self._stamp_s, 0.0)
-            now_s = boot_ms / 1000 + self._offset_s
-            self._restarts += 1
-        self._now_s, self._stamp_s = now_s, stamp_s
-        self._time_s.append(now_s)
-        self._altitude_m.append(-down_m)
-        self._climb_rate_m_s.append(-down_m_s)
+    def take(self, message: Message) -> None:
+        handlers: Mapping[str, Callable[[Message], None]] = {}
+        if (message.system, message.component) == (self.vehicle.system, self.vehicle.component):
+            handlers = self.reports
+        elif message.system != self.vehicle.system or message.name in _FROM_ANY:
+            handlers = self.requests
+        if message.name in handlers:
+            handlers[message.name](message)
 
     def recording(self) -> Recording:
         """What was read so far."""
+        autopilot = self.vehicle.autopilot
         self._events.extend(self._sent.values())  # a command without an answer counts as accepted
         for time_s, number in self._activated:
             name = self._blocks.get(number, "")
             takes_off = "takeoff" in name.casefold().replace(" ", "").replace("_", "")
             kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
             self._events.append(Event(kind, time_s, f"the block {name}" if name else f"block {number}"))
+        kind_of_vehicle = f"a vehicle of MAVLink's type {self.vehicle.kind}"
+        tables = {name: _table(name, values) for name, values in self._reports.items()}
         return Recording(
-            title=f"MAVLink log of {self.autopilot.title}",
+            title=f"MAVLink log of {autopilot.title}",
+            autopilot=autopilot.name,
             clock="vehicle",
-            columns=self._columns(),
-            from_ground=self.autopilot.from_ground,
-            gain_sets=self.autopilot.gain_sets,
+            system=self.vehicle.system,
+            frame="" if self.vehicle.kind in _COPTERS else _OTHER_KINDS.get(self.vehicle.kind, kind_of_vehicle),
+            columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
+            from_ground=autopilot.from_ground,
+            sources=list(tables),
+            gain_sets=autopilot.gain_sets,
             settings=self._settings,
-            events=self._events,
+            has_all_parameters=0 < self._parameters <= len(self._known),
+            events=[*self._events, *self._clock.restarts],
             armed=spans_of(self._arming) or None,
             blocks=list(self._commanded_blocks()),
-            notes=tuple(self._notes()),
+            notes=[*restarts(len(self._clock.restarts)), *self._unconfirmed()],
         )
 
-    def _columns(self) -> dict[str, Column]:
-        if not self._time_s:
-            return {}
-        rows = increasing(np.array(self._time_s))
-        time_s = np.array(self._time_s)[rows]
-        columns = {
-            "altitude_m": Column(time_s, np.array(self._altitude_m)[rows], "LOCAL_POSITION_NED.z"),
-            "climb_rate_m_s": Column(time_s, np.array(self._climb_rate_m_s)[rows], "LOCAL_POSITION_NED.vz"),
-        }
-        if self._battery:
-            columns["battery_v"] = Column(*np.array(self._battery).T, "SYS_STATUS.voltage_battery")
-        if self._throttle:
-            columns["throttle"] = Column(*np.array(self._throttle).T, "VFR_HUD.throttle", THROTTLE_HOLDS_S)
-        return columns
-
-    def _notes(self) -> Iterator[str]:
-        if self._restarts:
-            yield f"the vehicle restarted and reset its clock ({self._restarts}×)"
+    def _unconfirmed(self) -> Iterator[str]:
         for name, value in self._asked.items():
             yield f"{name} was set to {value:g}, but the vehicle never confirmed it"
 
-    def _is_vehicle(self, message: _Message) -> bool:
-        return message.get_srcSystem() == self.system
+    def _report(self, message: Message, *values: float) -> None:
+        """Take a report, dated by its own time, or else by the last one."""
+        has_time = "time_boot_ms" in message.fields
+        time_s = self._clock.at(message["time_boot_ms"], message.stamp_s) if has_time else self._clock.now_s
+        self._reports[message.name].extend((time_s, *values))
 
-    def _heartbeat(self, message: _Message) -> None:
-        if not self._is_vehicle(message) or _AUTOPILOTS.get(int(message.autopilot)) is not self.autopilot:
-            return
-        armed, mode = bool(int(message.base_mode) & _ARMED), int(message.custom_mode)
-        if self._armed and not armed:
-            self._events.append(Event(EventKind.MOTORS_OFF, self._now_s, "motors off"))
-        if self._mode not in {None, mode} and self._armed:
+    def _heartbeat(self, message: Message) -> None:
+        is_armed, mode, now_s = bool(int(message["base_mode"]) & _ARMED), int(message["custom_mode"]), self._clock.now_s
+        was_armed = bool(self._arming) and self._arming[-1][1]
+        if was_armed and not is_armed:
+            self._events.append(Event(EventKind.MOTORS_OFF, now_s, "motors off"))
+        if was_armed and self._mode != mode:
             self._mode_changed(mode)
-        self._arming.append((self._heard_s if armed else self._now_s, armed))  # it armed since the heartbeat before
-        self._armed, self._mode, self._heard_s = armed, mode, self._now_s
+        self._arming.append((self._heard_s if is_armed else now_s, is_armed))  # it armed since the heartbeat before
+        self._mode, self._heard_s = mode, now_s
+        self._report(message, float(is_armed), float(mode))
 
     def _mode_changed(self, mode: int) -> None:
         main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
-        if self.autopilot.has_takeoff_mode and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
-            if sub == _PX4_TAKEOFF_MODE:
-                self._events.append(Event(EventKind.TAKEOFF, self._now_s, "takeoff mode"))
-            return
-        self._events.append(Event(EventKind.MODE, self._now_s, f"mode {sub or mode}"))
+        if not self.vehicle.autopilot.has_takeoff_mode or main != 4 or sub not in (_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE):
+            self._events.append(Event(EventKind.MODE, self._clock.now_s, f"mode {sub or mode}"))
+        elif sub == _PX4_TAKEOFF_MODE:
+            self._events.append(Event(EventKind.TAKEOFF, self._clock.now_s, "takeoff mode"))
 
-    def _status(self, message: _Message) -> None:
-        millivolt = int(message.voltage_battery)
-        if self._is_vehicle(message) and 0 < millivolt < 0xFFFF and np.isfinite(self._now_s):
-            self._battery.append((self._now_s, millivolt / 1000))
+    def _position(self, message: Message) -> None:
+        self._report(message, message["z"], message["vz"])
 
-    def _reported_throttle(self, message: _Message) -> None:
-        percent = int(message.throttle)
-        if self._is_vehicle(message) and 0 <= percent <= 100 and np.isfinite(self._now_s):
-            self._throttle.append((self._now_s, percent / 100))
+    def _attitude_target(self, message: Message) -> None:
+        x, y, thrust = message["q[1]"], message["q[2]"], message["thrust"]
+        lean = 1.0 if int(message["type_mask"]) & _IGNORES_ATTITUDE else 1.0 - 2.0 * (x * x + y * y)
+        self._report(message, thrust if 0.0 <= thrust <= 1.0 else np.nan, lean)
 
-    def _set_mode(self, message: _Message) -> None:
-        if not self._is_vehicle(message):
-            self._events.append(Event(EventKind.COMMAND, self._now_s, "SET_MODE"))
+    def _position_target(self, message: Message) -> None:
+        is_unknown = self._is_fed or int(message["type_mask"]) & _IGNORES_Z
+        self._report(message, np.nan if is_unknown else message["z"])
 
-    def _parameter(self, message: _Message) -> None:
-        name, value = str(message.param_id), float(message.param_value)
-        if not self._is_vehicle(message) or not np.isfinite(value):
-            return
-        if name in self.autopilot.parameters:
-            gain = self.autopilot.parameters[name]
-            self._settings.append(Setting(self._now_s, gain, value))
-            if self._asked.get(gain) == value:
-                del self._asked[gain]
-        elif name in ("kil_thr", "aut_kil_thr") and value:
-            self._events.append(Event(EventKind.MOTORS_OFF, self._now_s, "motors off"))
+    def _reference_error(self, message: Message) -> None:
+        self._report(message, message["alt_error"])
 
-    def _parameter_asked(self, message: _Message) -> None:
-        name, value = str(message.param_id), float(message.param_value)
-        if name in self.autopilot.parameters and not self._is_vehicle(message) and np.isfinite(value):
-            kept = float(int(value)) if self.autopilot.keeps_whole_numbers else value
-            self._asked[self.autopilot.parameters[name]] = kept
+    def _battery(self, message: Message) -> None:
+        if 0 < message["voltage_battery"] < 0xFFFF and np.isfinite(self._clock.now_s):
+            self._report(message, message["voltage_battery"] / 1000)
 
-    def _command(self, message: _Message) -> None:
-        if self._is_vehicle(message):
-            return
-        number = int(message.command)
-        takeoff = number == _TAKEOFF or (
-            number == _SET_MODE and self.autopilot.has_takeoff_mode and message.param3 == _PX4_TAKEOFF_MODE
+    def _throttle(self, message: Message) -> None:
+        if 0 <= message["throttle"] <= 100 and np.isfinite(self._clock.now_s):
+            self._report(message, message["throttle"] / 100)
+
+    def _parameter(self, message: Message) -> None:
+        bytewise = self.vehicle.autopilot.sends_integers_bytewise and int(message["param_type"]) in _INTEGERS
+        value = float(struct.unpack("<i", message.payload[:4])[0]) if bytewise else message["param_value"]
+        name = self._name(message)
+        if name in ("kil_thr", "aut_kil_thr") and value:
+            self._events.append(Event(EventKind.MOTORS_OFF, self._clock.now_s, "motors off"))
+        is_first = name not in self._known and name not in self._written
+        self._known.add(name)
+        self._parameters = int(message["param_count"])
+        if np.isfinite(value):
+            self._settings.append(Setting(self._clock.now_s, name, value, held_before=is_first))
+            if self._asked.get(name) == value:
+                del self._asked[name]
+
+    def _name(self, message: Message) -> str:
+        """The parameter, by the name that it has in the gain sets if it is a gain."""
+        name = message.text("param_id")
+        return (self.vehicle.autopilot.parameters or {}).get(name, name)
+
+    def _parameter_asked(self, message: Message) -> None:
+        name, value, autopilot = self._name(message), message["param_value"], self.vehicle.autopilot
+        self._written.add(name)
+        if name in names_in(autopilot.gain_sets) and message.system != self.vehicle.system and np.isfinite(value):
+            self._asked[name] = float(int(value)) if autopilot.keeps_whole_numbers else value
+
+    def _position_asked(self, message: Message) -> None:
+        if message["target_system"] == self.vehicle.system:
+            given = ((message["vz"], _IGNORES_VZ), (message["afz"], _IGNORES_AZ))
+            mask = int(message["type_mask"])
+            self._is_fed = any(abs(value) > 0.0 and not mask & ignored for value, ignored in given)
+
+    def _mode_asked(self, _message: Message) -> None:
+        self._events.append(Event(EventKind.COMMAND, self._clock.now_s, "SET_MODE"))
+
+    def _command(self, message: Message) -> None:
+        number = int(message["command"])
+        takes_off = number == _TAKEOFF or (
+            number == _SET_MODE and self.vehicle.autopilot.has_takeoff_mode and message["param3"] == _PX4_TAKEOFF_MODE
         )
-        lands = number == _LAND or (number == _MOTORS and not message.param1)
-        if takeoff or lands or number == _SET_MODE:
-            kind = EventKind.TAKEOFF if takeoff else EventKind.COMMAND
-            self._sent[number] = Event(kind, self._now_s, f"the command {_command_name(number)}")
+        if number in _COMMANDS and not (number == _MOTORS and message["param1"]):
+            kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
+            self._sent[number] = Event(kind, self._clock.now_s, f"the command {_COMMANDS[number]}")
 
-    def _answer(self, message: _Message) -> None:
-        sent = self._sent.pop(int(message.command), None) if self._is_vehicle(message) else None
-        if sent is not None and message.result in _ACCEPTED:
+    def _answer(self, message: Message) -> None:
+        sent = self._sent.pop(int(message["command"]), None)
+        if sent is not None and message["result"] in _ACCEPTED:
             self._events.append(sent)
 
-    def _block(self, message: _Message) -> None:
-        if self._is_vehicle(message):
-            self._blocks[int(message.seq)] = str(message.name)
-        else:
-            self._activated.append((self._now_s, int(message.seq)))
+    def _block(self, message: Message) -> None:
+        self._blocks[int(message["seq"])] = message.text("name")
 
-    def _block_entered(self, message: _Message) -> None:
-        if self._is_vehicle(message):
-            self._entered.append((self._now_s, int(message.seq)))
+    def _block_asked(self, message: Message) -> None:
+        self._activated.append((self._clock.now_s, int(message["seq"])))
+
+    def _block_entered(self, message: Message) -> None:
+        self._entered.append((self._clock.now_s, int(message["seq"])))
 
     def _commanded_blocks(self) -> Iterator[Span]:
         """Every stay in a block that the vehicle entered on command, from the command to that of another one."""
@@ -320,5 +400,7 @@ class _Telemetry:
             before_s = entered_s
 
 
-def _command_name(command: int) -> str:
-    return {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}[command]
+def _table(message: str, reports: "array[float]") -> Table:
+    fields = [source.field for source in SOURCES.values() if source.message == message]
+    rows = np.array(reports).reshape(-1, 1 + len(fields))
+    return dict(zip((_TIME, *fields), rows.T, strict=True))

@@ -7,11 +7,7 @@ from functools import cache
 
 import pytest
 
-from app.autopilots.ardupilot.flight import ardupilot_flight
-from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.copter_tlog import read_copter_tlog
-from app.autopilots.px4.flight import px4_flight
-from app.autopilots.px4.log import read_px4
+from app.autopilots.readers import HEAD_BYTES, reader_of
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.prediction import FlightModel
@@ -23,11 +19,6 @@ from tests.logs.recorded import recorded
 
 pytestmark = compiled_only
 
-READERS = {
-    "bin": lambda stream, name: ardupilot_flight(read_ardupilot(stream), name=name),
-    "tlog": read_copter_tlog,
-    "ulg": lambda stream, name: px4_flight(read_px4(stream), name=name),
-}
 SITL: Mapping[str, float] = {"hover_throttle": 0.365, "thrust_slope": 1.0, "motor_lag_s": 0.0, "drag_1_s": 0.295}
 SIH: Mapping[str, float] = {"hover_throttle": 0.490, "thrust_slope": 1.0, "motor_lag_s": 0.05}
 """The vehicles of both simulations, by a regression of the acceleration in still air, and their own source. The drag of
@@ -60,7 +51,12 @@ FLIGHTS = (
 
 @cache
 def read(name: str) -> LoggedFlight:
-    return READERS[name.rpartition(".")[2]](io.BytesIO(recorded(name)), name=name)
+    content = recorded(name)
+    reader = reader_of(content[:HEAD_BYTES])
+    assert reader is not None
+    flight = reader.flight(reader.read(io.BytesIO(content), None), name)
+    assert flight is not None
+    return flight
 
 
 @pytest.mark.complete

@@ -38,7 +38,7 @@ def gusty() -> LoggedFlight:
 
 
 def read(content: bytes) -> LoggedFlight:
-    return ardupilot_flight(read_ardupilot(io.BytesIO(content)), name="flight.bin")
+    return ardupilot_flight(read_ardupilot(io.BytesIO(content)), "flight.bin")
 
 
 def loop_of(flight: LoggedFlight) -> ArduPilotLoop:

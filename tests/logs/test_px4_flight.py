@@ -42,7 +42,7 @@ def logged() -> Segment:
 
 
 def read(content: bytes) -> LoggedFlight:
-    return px4_flight(read_px4(io.BytesIO(content)), name="flight.ulg")
+    return px4_flight(read_px4(io.BytesIO(content)), "flight.ulg")
 
 
 def loop_of(flight: LoggedFlight) -> Px4Loop:

@@ -50,7 +50,7 @@ _USED: Final = frozenset({*LOOP_NAMES, *_THRUST_CURVE} - {_LEARNED})
 _HINT: Final = "Use ArduCopter's .bin log of a flight with altitude changes, with NTUN and CTUN in LOG_BITMASK."
 
 
-def ardupilot_flight(recording: Recording, *, name: str) -> LoggedFlight:
+def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
     """The parts in flight under the same parameters, at most 120 s, those with the most manoeuvres first.
 
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.

@@ -93,6 +93,7 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
     return Recording(
         title=f"ArduPilot's on-board log, altitude from {altitude}",
+        autopilot="ardupilot",
         clock="vehicle",
         firmware=_other_firmware(tables),
         columns=columns,

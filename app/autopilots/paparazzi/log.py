@@ -62,6 +62,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Recor
         notes.append(f"other aircraft in the log left out: {', '.join(sorted(lines.others)[:5])}")
     return Recording(
         title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
+        autopilot="paparazzi",
         clock="ground",
         columns=columns,
         from_ground=False,

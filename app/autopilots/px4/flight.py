@@ -53,7 +53,7 @@ _HINT: Final = (
 )
 
 
-def px4_flight(recording: Recording, *, name: str) -> LoggedFlight:
+def px4_flight(recording: Recording, name: str) -> LoggedFlight:
     """The parts in flight under the same parameters, at most 120 s, those with the most manoeuvres first.
 
     Raises TrajectoryError naming the topic or parameter that is missing, or InputError for one not supported.

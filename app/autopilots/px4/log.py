@@ -87,6 +87,7 @@ def read_px4(stream: BinaryIO) -> Recording:
     columns = columns_of(tables.topics, SOURCES, clock="timestamp")
     recording = Recording(
         title="PX4's log (ULog)",
+        autopilot="px4",
         clock="vehicle",
         columns=columns,
         from_ground=True,

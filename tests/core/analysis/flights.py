@@ -37,7 +37,7 @@ GUSTY = replace(QUIET, gust_m_s2=0.2, noise_m_s2=0.1, wander_m_s=0.01, wander_m=
 
 def recorded_steps() -> LoggedFlight:
     """The binary's flight with default gains, its 13 s of steps scored."""
-    flight = ardupilot_flight(read_ardupilot(io.BytesIO(recorded("arducopter_steps.bin"))), name="steps.bin")
+    flight = ardupilot_flight(read_ardupilot(io.BytesIO(recorded("arducopter_steps.bin"))), "steps.bin")
     (segment,) = flight.segments
     rows = segment.time_s >= STEPS_BEGIN_S - LEAD_S
     names = type(segment).__slots__

@@ -1,0 +1,123 @@
+"""Frames of telemetry logs (.tlog): both directions of a MAVLink connection, each preceded by its time in µs."""
+
+import re
+import struct
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from types import ModuleType
+from typing import Final
+
+from app.logs.base import Contents
+
+_STAMP_BYTES: Final = 8
+_MAGICS: Final = (0xFE, 0xFD)
+_MAGIC: Final = re.compile(rb"[\xfe\xfd]")
+_SIGNED: Final = 0x01
+_FIRST_US, _LAST_US = 631_152_000_000_000, 4_102_444_800_000_000
+"""Time stamps of the years 1990 … 2100."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Location of a frame: its first byte and the one past its last; its message number, sender and payload."""
+
+    start: int
+    end: int
+    message: int
+    system: int
+    component: int
+    payload: int
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message without damage: its name, its sender, the ground's time, s, the bytes of the payload, and its fields by
+    their names in the dialect, those of an array as "q[0]"."""
+
+    name: str
+    system: int
+    component: int
+    stamp_s: float
+    payload: bytes
+    fields: Mapping[str, float | bytes]
+
+    def __getitem__(self, field: str) -> float:
+        value = self.fields[field]
+        return value if isinstance(value, int | float) else float("nan")
+
+    def text(self, field: str) -> str:
+        return bytes(self.fields[field]).partition(b"\0")[0].decode("ascii", "replace")
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """Fields of a message on the wire, and the byte that its checksum begins with."""
+
+    name: str
+    extra: bytes
+    unpacker: struct.Struct
+    fields: tuple[str, ...]
+
+
+def is_tlog(head: bytes) -> bool:
+    """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame."""
+    return (
+        len(head) > _STAMP_BYTES
+        and head[_STAMP_BYTES] in _MAGICS
+        and _FIRST_US <= int.from_bytes(head[:_STAMP_BYTES], "big") <= _LAST_US
+    )
+
+
+def frames(data: Contents) -> Iterator[Frame]:
+    """Every frame that is followed by another one, or by the log's end; damaged parts are skipped."""
+    position, size = _STAMP_BYTES, len(data)
+    while position + 12 <= size:
+        frame = _frame_at(data, position, size)
+        if frame is None:
+            found = _MAGIC.search(data, position + 1)
+            position = found.start() if found else size
+        else:
+            yield frame
+            position = frame.end + _STAMP_BYTES
+
+
+def messages(data: Contents, dialect: ModuleType, names: Collection[str]) -> Iterator[Message]:
+    """Every message with one of these names and a correct checksum, of any sender."""
+    numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in names}
+    layouts = {number: _layout(dialect, name) for name, number in numbers.items() if number is not None}
+    for frame in frames(data):
+        layout = layouts.get(frame.message)
+        if layout is None:
+            continue
+        past = frame.payload + data[frame.start + 1]
+        checksum = int.from_bytes(data[past : past + 2], "little")
+        if dialect.x25crc(data[frame.start + 1 : past] + layout.extra).crc == checksum:
+            size = layout.unpacker.size  # MAVLink 2 truncates trailing zeros
+            payload = data[frame.payload : past][:size].ljust(size, b"\0")
+            fields = dict(zip(layout.fields, layout.unpacker.unpack(payload), strict=True))
+            stamp_s = int.from_bytes(data[frame.start - _STAMP_BYTES : frame.start], "big") / 1e6
+            yield Message(layout.name, frame.system, frame.component, stamp_s, payload, fields)
+
+
+def _layout(dialect: ModuleType, name: str) -> _Layout:
+    defined = getattr(dialect, f"MAVLink_{name.lower()}_message")
+    lengths = zip(defined.ordered_fieldnames, defined.lengths, strict=True)
+    fields = ([field] if length == 1 else [f"{field}[{place}]" for place in range(length)] for field, length in lengths)
+    return _Layout(name, bytes([defined.crc_extra]), defined.unpacker, tuple(chain.from_iterable(fields)))
+
+
+def _frame_at(data: Contents, start: int, size: int) -> Frame | None:
+    magic, length = data[start], data[start + 1]
+    if magic == 0xFE:
+        end, payload, sender, message = start + 8 + length, start + 6, start + 3, data[start + 5]
+    elif magic == 0xFD:
+        end, payload, sender = start + 12 + length, start + 10, start + 5
+        end += 13 if data[start + 2] & _SIGNED else 0
+        message = int.from_bytes(data[start + 7 : start + 10], "little")
+    else:
+        return None
+    following = end + _STAMP_BYTES
+    if end > size or (following < size and data[following] not in _MAGICS):
+        return None
+    return Frame(start, end, message, data[sender], data[sender + 1], payload)
