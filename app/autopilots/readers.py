@@ -1,6 +1,6 @@
-"""All supported kinds of logs, recognised by their first bytes; a new one takes one line in `READERS`."""
+"""All supported kinds of logs; a new one takes one line in `READERS`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import PurePath
@@ -9,7 +9,7 @@ from typing import BinaryIO, Final
 from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.copter_tlog import copter_steps
-from app.autopilots.paparazzi.log import is_paparazzi, read_paparazzi
+from app.autopilots.paparazzi.log import read_paparazzi
 from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
 from app.autopilots.recording import Recording
@@ -19,29 +19,25 @@ from app.autopilots.tlog import read_tlog
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.logs.base import refused
-from app.logs.dataflash import is_dataflash
+from app.logs.formats import HEAD_BYTES, Format, recognise
+from app.logs.paparazzi import HINT as PAPARAZZI_HINT
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.logs.tlog import is_tlog
-from app.logs.ulog_tables import HINT as ULOG_HINT
-from app.logs.ulog_tables import is_ulog
+from app.logs.ulog import HINT as ULOG_HINT
 
-HEAD_BYTES: Final = 256
 _COMPANION: Final = ".log"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
-    """One kind of log: its file suffix and title, a test of its first bytes, the function that decodes it, and the one
-    that gives the flight in it that can be analysed, None if its takeoffs are. `altitude` are the messages that have
-    it, and `hint` says which log to use where it has none."""
+    """One kind of log: its title, the function that decodes it, and the one that gives the flight in it that can be
+    analysed, None if its takeoffs are. `altitude` are the messages that have it, and `hint` says which log to use where
+    it has none."""
 
-    suffix: str
     title: str
-    recognises: Callable[[bytes], bool]
     read: Callable[[BinaryIO, BinaryIO | None], Recording]
     flight: Callable[[Recording, str], LoggedFlight | None]
-    altitude: str = ""
-    hint: str = ""
+    altitude: str
+    hint: str
 
     def takeoffs(self, recording: Recording) -> Sequence[Takeoff]:
         """Every takeoff. Raises TrajectoryError if there is none, or no altitude."""
@@ -55,49 +51,38 @@ def _alone(read: Callable[[BinaryIO], Recording]) -> Callable[[BinaryIO, BinaryI
     return lambda stream, _companion: read(stream)
 
 
-READERS: Final = (
-    Reader(
-        suffix=".tlog",
+READERS: Final[Mapping[Format, Reader]] = {
+    Format.TLOG: Reader(
         title="MAVLink telemetry log",
-        recognises=is_tlog,
         read=_alone(read_tlog),
         flight=copter_steps,
         altitude="no LOCAL_POSITION_NED of the vehicle",
         hint=TLOG_HINT,
     ),
-    Reader(
-        suffix=".bin",
+    Format.DATAFLASH: Reader(
         title="ArduPilot's on-board log",
-        recognises=is_dataflash,
         read=_alone(read_ardupilot),
         flight=ardupilot_flight,
         altitude="neither PSCD.PD nor CTUN.Alt, the altitude",
         hint="Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN).",
     ),
-    Reader(
-        suffix=".ulg",
+    Format.ULOG: Reader(
         title="PX4's log",
-        recognises=is_ulog,
         read=_alone(read_px4),
         flight=px4_flight,
         altitude="no vehicle_local_position.z, the altitude",
         hint=ULOG_HINT,
     ),
-    Reader(
-        suffix=".data",
+    Format.PAPARAZZI: Reader(
         title="Paparazzi's ground log",
-        recognises=is_paparazzi,
         read=read_paparazzi,
         flight=lambda _recording, _name: None,
+        altitude="neither VERT_LOOP nor ROTORCRAFT_FP",
+        hint=PAPARAZZI_HINT,
     ),
-)
+}
 
-SUFFIXES: Final = (".csv", *(reader.suffix for reader in READERS))
-
-
-def reader_of(head: bytes) -> Reader | None:
-    """The reader of a file with these first bytes; None if it is no log."""
-    return next((reader for reader in READERS if reader.recognises(head)), None)
+SUFFIXES: Final = (".csv", *READERS)
 
 
 def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | None = None) -> Sequence[Takeoff]:
@@ -109,8 +94,8 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     stream.seek(0)
     head = stream.read(HEAD_BYTES)
     stream.seek(0)
-    if (reader := reader_of(head)) is not None:
-        return reader.takeoffs(reader.read(stream, companion))
+    if (log := recognise(head)) in READERS:
+        return READERS[log].takeoffs(READERS[log].read(stream, companion))
     suffix = PurePath(name).suffix.lower()
     if suffix == _COMPANION:
         raise TrajectoryError(
@@ -118,13 +103,13 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
             hint="A .log file goes with Paparazzi's .data file of the same name: choose both.",
             problems=(Problem("file", "is a companion file, not a record"),),
         )
-    expected = next((reader for reader in READERS if reader.suffix == suffix), None)
-    if expected is not None:
+    if suffix in READERS:
+        expected = READERS[Format(suffix)].title
         raise TrajectoryError(
             f"{PurePath(name).name[:80]} does not match its file extension.",
-            hint=f"A {suffix} file is {expected.title}; check that it was copied completely. Supported: "
+            hint=f"A {suffix} file is {expected}; check that it was copied completely. Supported: "
             f"{', '.join(SUFFIXES)}.",
-            problems=(Problem("file", "is empty" if not head else f"does not start like {expected.title}"),),
+            problems=(Problem("file", "is empty" if not head else f"does not start like {expected}"),),
         )
     trajectory = read_takeoff_csv(stream)
     return (Takeoff(number=1, start_s=0.0, begins_with="the command", trajectory=trajectory, gains={}),)

@@ -1,9 +1,10 @@
 """Content of an uploaded log, in the process that reads it: its takeoffs, and its analysis."""
 
 import io
+from collections.abc import Mapping
 from typing import Final
 
-from app.autopilots.readers import HEAD_BYTES, reader_of
+from app.autopilots.readers import READERS
 from app.autopilots.takeoffs import Takeoff
 from app.core.analysis.analysis import analyze
 from app.core.analysis.flight import LoggedFlight
@@ -12,36 +13,29 @@ from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.log_analyses.copter_start import CopterStart, start_of
 from app.log_analyses.manoeuvres import AnalysedManoeuvres
 from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
+from app.logs.formats import HEAD_BYTES, Format, recognise
 
 ANALYSED: Final = (
     "ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or .tlog log "
     "of a takeoff"
 )
-_OTHER_FILES: Final = (
-    (b"\x1f\x8b", "is compressed (gzip): unpack it first"),
-    (b"PK\x03\x04", "is an archive (zip): unpack it first"),
-    (b"FMT, ", "is a .bin log converted to text: use the .bin itself"),
-)
-"""First bytes of files that are no log, but contain one."""
+_OTHER_FILES: Final[Mapping[Format | None, str]] = {
+    Format.GZIP: "is compressed (gzip): unpack it first",
+    Format.ZIP: "is an archive (zip): unpack it first",
+    Format.DATAFLASH_TEXT: "is a .bin log converted to text: use the .bin itself",
+}
 
 
 def _read(content: bytes, companion: bytes | None, name: str) -> LoggedFlight | list[Takeoff]:
     """The flight of a copter's log, or every takeoff of a Paparazzi log."""
-    head = content[:HEAD_BYTES]
-    reader = reader_of(head)
+    log = recognise(content[:HEAD_BYTES])
+    reader = None if log is None else READERS.get(log)
     if reader is None:
-        raise TrajectoryError(
-            f"{name} cannot be used.", hint=f"Use {ANALYSED}.", problems=(Problem("file", _what_else(head)),)
-        )
+        what = _OTHER_FILES.get(log, "is not a log") if content else "is empty"
+        raise TrajectoryError(f"{name} cannot be used.", hint=f"Use {ANALYSED}.", problems=(Problem("file", what),))
     recording = reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
     flight = reader.flight(recording, name)
     return list(reader.takeoffs(recording)) if flight is None else flight
-
-
-def _what_else(head: bytes) -> str:
-    """What a file with these first bytes is, if it is no log."""
-    found = (what for begin, what in _OTHER_FILES if head.startswith(begin))
-    return next(found, "is not a log") if head else "is empty"
 
 
 def read_start(content: bytes, companion: bytes | None, name: str) -> list[Takeoff] | CopterStart:

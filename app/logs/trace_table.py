@@ -23,6 +23,7 @@ from app.core.records.trajectory import Samples
 from app.logs.loop_trace import GZIP, IN_MEMORY_BYTES, MAX_ROWS, unpack
 
 _DESCRIPTION_CHARACTERS: Final = 2**16
+_GZIP_WINDOW: Final = 31
 _FIRST_ROW: Final = 3
 """Line of the first row."""
 
@@ -83,10 +84,18 @@ class TraceChecks:
 
 
 def has_columns(beginning: bytes, columns: Collection[str]) -> bool:
-    """Whether text with this beginning is such a run with at least these columns."""
-    first, _, rest = beginning.partition(b"\n")
+    """Whether a file with this beginning, plain or gzipped, is such a run with at least these columns."""
+    first, _, rest = _unzipped(beginning).partition(b"\n")
     header = rest.partition(b"\n")[0].decode("utf-8", "replace")
     return first.startswith(b"#") and set(columns) <= {name.strip() for name in header.split(",")}
+
+
+def _unzipped(head: bytes) -> bytes:
+    """The beginning of the file that is gzipped into one with this head; the head itself if it is not gzipped."""
+    try:
+        return zlib.decompressobj(_GZIP_WINDOW).decompress(head)
+    except zlib.error:
+        return head
 
 
 def read_trace_table(

@@ -7,13 +7,14 @@ from functools import cache
 
 import pytest
 
-from app.autopilots.readers import HEAD_BYTES, reader_of
+from app.autopilots.readers import READERS
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
+from app.logs.formats import HEAD_BYTES, recognise
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
 
@@ -52,8 +53,9 @@ FLIGHTS = (
 @cache
 def read(name: str) -> LoggedFlight:
     content = recorded(name)
-    reader = reader_of(content[:HEAD_BYTES])
-    assert reader is not None
+    kind = recognise(content[:HEAD_BYTES])
+    assert kind is not None
+    reader = READERS[kind]
     flight = reader.flight(reader.read(io.BytesIO(content), None), name)
     assert flight is not None
     return flight

@@ -1,12 +1,10 @@
-"""Reader of Paparazzi's ground logs.
+"""Paparazzi's ground log to a `Recording`.
 
-A log is a .data file with one message per line, and its .log companion, XML, with the airframe and the settings. A line
-contains the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks. VERT_LOOP
-contains the complete state of the vertical loop, in its own integers; without it the altitude comes from ROTORCRAFT_FP.
+A log is a .data file, and its .log companion, XML, with the airframe and the settings. VERT_LOOP contains the complete
+state of the vertical loop, in its own integers; without it the altitude comes from ROTORCRAFT_FP.
 """
 
 import re
-from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise, product
@@ -17,16 +15,14 @@ from xml.parsers import expat
 import numpy as np
 
 from app.autopilots.recording import Column, Event, EventKind, GainSets, Recording, Setting, increasing, own_names
-from app.core.control.loop_log import FIELDS, GAINS, FlownGains, LoopLog, flown_gains
-from app.core.control.paparazzi import FULL_THRUST, INT32_MAX, INT32_MIN
+from app.core.control.loop_log import GAINS, FlownGains, LoopLog, flown_gains
+from app.core.control.paparazzi import FULL_THRUST
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
 from app.logs.base import refused
+from app.logs.paparazzi import PaparazziLines, number_in, read_lines
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20
-_MAX_SAMPLES: Final = 2_000_000
-_MAX_LINE_BYTES: Final = 4096
-_LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
 _GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
 _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
 _SETTINGS: Final = 256
@@ -37,146 +33,51 @@ PARAMETERS: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_
 """Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
 GAIN_SETS: Final[GainSets] = (own_names(*GAINS),)
 
-_WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
-_HINT: Final = "Use the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaparazziRecording(Recording):
+    """With the samples of the vertical loop, None if they were not logged, and the gains that its commands follow from;
+    `are_logged`: all of these are in the log's files."""
+
+    loop: LoopLog | None
+    flown: Sequence[FlownGains]
+    are_logged: bool
 
 
-def is_paparazzi(head: bytes) -> bool:
-    """Whether a file with this head is a .data file."""
-    return bool(_LINE.match(head))
+def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> PaparazziRecording:
+    """Decode a .data file and its companion, if given. The gains are those that the loop's commands follow from;
+    without VERT_LOOP those in the companion, as far as they are certain.
 
-
-def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Recording:
-    """Read a .data file and its companion, if given. The gains are those that the loop's commands follow from; without
-    VERT_LOOP those in the companion, as far as they are certain.
-
-    Raises TrajectoryError if there is no altitude, or the companion cannot be read.
+    Raises TrajectoryError if either cannot be read.
     """
-    lines = _read(stream)
-    configuration = _configuration(companion, lines)
-    columns = _columns(lines)
+    lines = read_lines(stream)
+    configuration = _Configuration(lines.aircraft)
+    if companion is not None:
+        configuration.read(companion, lines.values)
     loop = lines.loop_log() if lines.loop_time_s else None
     flown = [] if loop is None else flown_gains(loop, configuration.candidates)
-    notes = list(configuration.notes(flown))
-    if lines.others:
-        notes.append(f"other aircraft in the log left out: {', '.join(sorted(lines.others)[:5])}")
-    return Recording(
+    others = ", ".join(sorted(lines.others)[:5])
+    return PaparazziRecording(
         title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
         autopilot="paparazzi",
         clock="ground",
-        columns=columns,
+        columns=_columns(lines, loop),
         from_ground=False,
         gain_sets=GAIN_SETS,
         settings=list(configuration.settings(flown)),
         events=[] if loop is None else [*_starts(loop), *_ends(loop)],
-        notes=tuple(notes),
+        notes=list(configuration.notes(flown)),
+        remarks=[f"other aircraft in the log left out: {others}"] if others else [],
+        loop=loop,
+        flown=flown,
+        are_logged=configuration.contains(flown),
     )
 
 
-@dataclass(frozen=True, slots=True)
-class LoggedLoop:
-    """Samples of the vertical loop, the gains flown, and notes on these; `are_logged`: all are in the log's files."""
-
-    log: LoopLog
-    flown: Sequence[FlownGains]
-    are_logged: bool
-    notes: Sequence[str]
-
-
-def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> LoggedLoop:
-    """Read the samples of the vertical loop, and find the gains flown. Raises TrajectoryError if there is no
-    VERT_LOOP."""
-    lines = _read(stream)
-    if not len(lines.loop_time_s):
-        raise refused("contains no VERT_LOOP, the loop's inputs and commands", _HINT)
-    configuration, log = _configuration(companion, lines), lines.loop_log()
-    flown = flown_gains(log, configuration.candidates)
-    return LoggedLoop(log, flown, configuration.contains(flown), list(configuration.notes(flown)))
-
-
-@dataclass(slots=True)
-class _Lines:
-    """Messages of one aircraft: the first one that reports its altitude."""
-
-    aircraft: str = ""
-    others: set[str] = field(default_factory=set)
-    loop_time_s: "array[float]" = field(default_factory=lambda: array("d"))
-    loop: "array[int]" = field(default_factory=lambda: array("q"))
-    time_s: "array[float]" = field(default_factory=lambda: array("d"))
-    up: "array[int]" = field(default_factory=lambda: array("q"))
-    up_speed: "array[int]" = field(default_factory=lambda: array("q"))
-    values: list[tuple[float, int, float]] = field(default_factory=list)
-
-    def loop_log(self) -> LoopLog:
-        """The samples whose time increases."""
-        time_s, values = np.array(self.loop_time_s), np.array(self.loop, dtype=np.int64).reshape(-1, len(FIELDS))
-        rising = np.ones(len(time_s), dtype=np.bool_)
-        rising[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
-        return LoopLog(time_s[rising], values[rising])
-
-
-def _read(stream: BinaryIO) -> _Lines:
-    """Parse the stream; lines other than these messages are skipped."""
-    lines = _Lines()
-    stream.seek(0)
-    if not is_paparazzi(stream.read(_MAX_LINE_BYTES)):
-        raise refused("does not start with a line of time, aircraft and message", _HINT)
-    stream.seek(0)
-    while line := stream.readline(_MAX_LINE_BYTES):
-        fields = line.split(maxsplit=3)
-        if len(fields) == 4 and fields[2] in _WANTED:
-            _take(lines, fields[0], fields[1].decode("ascii", "replace")[:32], fields[2], fields[3].split())
-    return lines
-
-
-def _take(lines: _Lines, time: bytes, aircraft: str, message: bytes, fields: Sequence[bytes]) -> None:
-    time_s = _float(time)
-    if not np.isfinite(time_s) or (lines.aircraft and aircraft != lines.aircraft):
-        lines.others.update([aircraft] if len(lines.others) < 5 and aircraft != lines.aircraft else [])
-        return
-    if message == b"VERT_LOOP" and len(lines.loop_time_s) < _MAX_SAMPLES:
-        if (numbers := _whole(fields, len(FIELDS))) is not None:
-            lines.loop_time_s.append(time_s)
-            lines.loop.extend(numbers)
-            lines.aircraft = aircraft
-    elif message == b"ROTORCRAFT_FP" and len(lines.time_s) < _MAX_SAMPLES:
-        if (numbers := _whole(fields, 6)) is not None:
-            lines.time_s.append(time_s)
-            lines.up.append(numbers[2])
-            lines.up_speed.append(numbers[5])
-            lines.aircraft = aircraft
-    elif message == b"DL_VALUE" and lines.aircraft and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
-        number, value = _whole(fields, 1), _float(fields[1])
-        if number is not None and np.isfinite(value):
-            lines.values.append((time_s, number[0], value))
-
-
-def _whole(fields: Sequence[bytes], count: int) -> list[int] | None:
-    """The first fields as 32-bit integers; None if there are fewer, or other values."""
-    if len(fields) < count:
-        return None
-    try:
-        numbers = [int(each) for each in fields[:count]]
-    except ValueError:
-        return None
-    return numbers if min(numbers) >= INT32_MIN and max(numbers) <= INT32_MAX else None
-
-
-def _float(text: bytes) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return np.nan
-
-
-def _columns(lines: _Lines) -> dict[str, Column]:
-    """Columns of the loop, and of the position if its message is more frequent. Raises TrajectoryError if there is
-    neither."""
-    if not lines.loop_time_s and not lines.time_s:
-        raise refused("contains neither VERT_LOOP nor ROTORCRAFT_FP", _HINT)
-    log = lines.loop_log()
-    loop = _loop_channels(log) if lines.loop_time_s else {}
-    columns = {name: Column(log.time_s, values, "VERT_LOOP") for name, values in loop.items()}
+def _columns(lines: PaparazziLines, loop: LoopLog | None) -> dict[str, Column]:
+    """Columns of the loop, and of the position if its message is more frequent."""
+    channels = {} if loop is None else _loop_channels(loop)
+    columns = {name: Column(loop.time_s, values, "VERT_LOOP") for name, values in channels.items() if loop is not None}
     if len(lines.loop_time_s) >= len(lines.time_s):
         return columns
     rows = increasing(np.array(lines.time_s))
@@ -221,13 +122,6 @@ def _ends(log: LoopLog) -> list[Event]:
             )
         held_since_s = float(log.time_s[place + 1])
     return moments
-
-
-def _configuration(companion: BinaryIO | None, lines: _Lines) -> "_Configuration":
-    configuration = _Configuration(lines.aircraft)
-    if companion is not None:
-        configuration.read(companion, lines.values)
-    return configuration
 
 
 @dataclass(slots=True)
@@ -329,7 +223,7 @@ class _Configuration:
             group = self._groups[-1] if self._generated is None else self._generated
             group.append(f"k{match[1].lower()}" if match else "")
         elif kind == "define" and (match := _AIRFRAME_GAIN.fullmatch(given.get("name", ""))):
-            value = _float(given.get("value", "").encode())
+            value = number_in(given.get("value", "").encode())
             if np.isfinite(value):
                 self.known[f"k{match[1].lower()}"] = [(-np.inf, abs(value))]
 

@@ -23,7 +23,7 @@ from app.autopilots.recording import (
 from app.core.control.px4_parameters import GAINS, LOOP_NAMES
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, rows_of
-from app.logs.ulog_tables import has_rows, read_ulog_tables
+from app.logs.ulog import has_rows, read_ulog_tables
 
 POSITION, TARGET, SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
 TAKEOFF, STATUS = "takeoff_status", "vehicle_status"
