@@ -85,6 +85,12 @@ READERS: Final[Mapping[Format, Reader]] = {
 SUFFIXES: Final = (".csv", *READERS)
 
 
+def reader_of(head: bytes) -> Reader | None:
+    """The reader of a file with these first bytes; None if it is no log."""
+    log = recognise(head)
+    return None if log is None else READERS.get(log)
+
+
 def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | None = None) -> Sequence[Takeoff]:
     """Read every takeoff in a log, or the single one in a CSV file.
 
@@ -94,8 +100,8 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     stream.seek(0)
     head = stream.read(HEAD_BYTES)
     stream.seek(0)
-    if (log := recognise(head)) in READERS:
-        return READERS[log].takeoffs(READERS[log].read(stream, companion))
+    if (reader := reader_of(head)) is not None:
+        return reader.takeoffs(reader.read(stream, companion))
     suffix = PurePath(name).suffix.lower()
     if suffix == _COMPANION:
         raise TrajectoryError(

@@ -258,7 +258,7 @@ def increasing(at_s: Samples) -> NDArray[np.int64]:
 def _latest(at_s: Samples) -> NDArray[np.int64]:
     """The last row, shape (k,), of each time that is later than all before it."""
     kept = np.flatnonzero(at_s >= np.fmax.accumulate(at_s))
-    return kept[np.append(at_s[kept[1:]] > at_s[kept[:-1]], np.ones(len(kept[:1]), dtype=np.bool_))]
+    return np.append(kept[:-1][at_s[kept[1:]] > at_s[kept[:-1]]], kept[-1:])
 
 
 def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:

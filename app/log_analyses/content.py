@@ -4,7 +4,7 @@ import io
 from collections.abc import Mapping
 from typing import Final
 
-from app.autopilots.readers import READERS
+from app.autopilots.readers import reader_of
 from app.autopilots.takeoffs import Takeoff
 from app.core.analysis.analysis import analyze
 from app.core.analysis.flight import LoggedFlight
@@ -28,10 +28,10 @@ _OTHER_FILES: Final[Mapping[Format | None, str]] = {
 
 def _read(content: bytes, companion: bytes | None, name: str) -> LoggedFlight | list[Takeoff]:
     """The flight of a copter's log, or every takeoff of a Paparazzi log."""
-    log = recognise(content[:HEAD_BYTES])
-    reader = None if log is None else READERS.get(log)
+    head = content[:HEAD_BYTES]
+    reader = reader_of(head)
     if reader is None:
-        what = _OTHER_FILES.get(log, "is not a log") if content else "is empty"
+        what = _OTHER_FILES.get(recognise(head), "is not a log") if head else "is empty"
         raise TrajectoryError(f"{name} cannot be used.", hint=f"Use {ANALYSED}.", problems=(Problem("file", what),))
     recording = reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
     flight = reader.flight(recording, name)

@@ -8,6 +8,8 @@ from itertools import chain
 from types import ModuleType
 from typing import Final
 
+import numpy as np
+
 from app.logs.base import Contents
 
 _STAMP_BYTES: Final = 8
@@ -44,10 +46,11 @@ class Message:
 
     def __getitem__(self, field: str) -> float:
         value = self.fields[field]
-        return value if isinstance(value, int | float) else float("nan")
+        return np.nan if isinstance(value, bytes) else float(value)
 
     def text(self, field: str) -> str:
-        return bytes(self.fields[field]).partition(b"\0")[0].decode("ascii", "replace")
+        raw = self.fields[field]
+        return raw.partition(b"\0")[0].decode("ascii", "replace") if isinstance(raw, bytes) else ""
 
 
 @dataclass(frozen=True, slots=True)

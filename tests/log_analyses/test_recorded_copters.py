@@ -7,14 +7,14 @@ from functools import cache
 
 import pytest
 
-from app.autopilots.readers import READERS
+from app.autopilots.readers import reader_of
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
-from app.logs.formats import HEAD_BYTES, recognise
+from app.logs.formats import HEAD_BYTES
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
 
@@ -53,9 +53,8 @@ FLIGHTS = (
 @cache
 def read(name: str) -> LoggedFlight:
     content = recorded(name)
-    kind = recognise(content[:HEAD_BYTES])
-    assert kind is not None
-    reader = READERS[kind]
+    reader = reader_of(content[:HEAD_BYTES])
+    assert reader is not None
     flight = reader.flight(reader.read(io.BytesIO(content), None), name)
     assert flight is not None
     return flight

@@ -133,7 +133,7 @@ def _lean(recording: Recording, time_s: Samples) -> Samples:
     if not {"roll_deg", "pitch_deg"} <= recording.columns.keys():
         return np.ones(len(time_s))
     roll, pitch = (np.radians(recording.columns[each].beside(time_s)) for each in ("roll_deg", "pitch_deg"))
-    return np.nan_to_num(np.cos(roll) * np.cos(pitch), nan=1.0)
+    return np.asarray(np.nan_to_num(np.cos(roll) * np.cos(pitch), nan=1.0))
 
 
 def _is_reset(rows: Segment) -> Rows:

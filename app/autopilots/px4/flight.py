@@ -150,7 +150,7 @@ def _lean(recording: Recording) -> Samples:
     ]
     with np.errstate(invalid="ignore", divide="ignore"):
         lean = thrust / np.sqrt(thrust**2 + np.sum(horizontal, axis=0))
-    return np.nan_to_num(lean, nan=1.0)
+    return np.asarray(np.nan_to_num(lean, nan=1.0))
 
 
 def _flying(recording: Recording, time_s: Samples) -> Rows:
