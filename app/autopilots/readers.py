@@ -14,8 +14,8 @@ from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
 from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
-from app.autopilots.tlog import HINT as TLOG_HINT
 from app.autopilots.tlog import read_tlog
+from app.autopilots.tlog_vehicle import HINT as TLOG_HINT
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.logs.base import refused

@@ -6,26 +6,20 @@ by the last message that has one. A takeoff begins with the ground station's com
 the one in which it lifted off; NAV_TAKEOFF, the takeoff mode); parameters are those that the vehicle replies with.
 """
 
-import importlib
 import struct
 from array import array
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.log import GAIN_SETS as ARDUPILOT_SETS
-from app.autopilots.paparazzi.log import GAIN_SETS as PAPARAZZI_SETS
-from app.autopilots.paparazzi.log import PARAMETERS
-from app.autopilots.px4.log import GAIN_SETS as PX4_SETS
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
     Event,
     EventKind,
-    GainSets,
     Recording,
     Setting,
     Source,
@@ -35,14 +29,11 @@ from app.autopilots.recording import (
     restarts,
     spans_of,
 )
+from app.autopilots.tlog_vehicle import LoggedVehicle, find_vehicle
 from app.core.records.trajectory import THROTTLE_HOLDS_S
-from app.logs.base import Contents, Table, contents, refused
-from app.logs.tlog import Message, frames, messages
+from app.logs.base import Table, contents
+from app.logs.tlog import Message, messages
 
-HINT: Final = (
-    "Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
-    "contain the ground station's commands."
-)
 SOURCES: Final[Mapping[str, Source]] = {
     "altitude_m": Source("LOCAL_POSITION_NED", "z", -1.0),
     "climb_rate_m_s": Source("LOCAL_POSITION_NED", "vz", -1.0),
@@ -74,101 +65,16 @@ _IGNORES_Z: Final = 4
 _IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
 _IGNORES_ATTITUDE: Final = 128
 _INTEGERS: Final = range(1, 9)
-_COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
-"""Kinds of vehicles with several rotors, in a heartbeat."""
-_OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
-    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Autopilot:
-    """Differences between autopilots.
-
-    `parameters` maps their parameter names to those of the gains, where these differ. Some store gains as integers
-    only; some send integers byte by byte in place of a float; some have a takeoff mode.
-    """
-
-    name: str
-    title: str
-    dialect_module: str
-    gain_sets: GainSets
-    parameters: Mapping[str, str] | None = None
-    from_ground: bool = True
-    keeps_whole_numbers: bool = False
-    sends_integers_bytewise: bool = False
-    has_takeoff_mode: bool = False
-
-    @property
-    def dialect(self) -> ModuleType:
-        """Loaded when the first log of such a vehicle is read, because a dialect contains a thousand classes."""
-        return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
-
-
-_AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
-    {
-        9: _Autopilot(
-            name="paparazzi",
-            title="Paparazzi",
-            dialect_module="v10.paparazzi",
-            gain_sets=PAPARAZZI_SETS,
-            parameters=PARAMETERS,
-            from_ground=False,
-            keeps_whole_numbers=True,
-        ),
-        3: _Autopilot(
-            name="ardupilot", title="ArduPilot", dialect_module="v20.ardupilotmega", gain_sets=ARDUPILOT_SETS
-        ),
-        12: _Autopilot(
-            name="px4",
-            title="PX4",
-            dialect_module="v20.common",
-            gain_sets=PX4_SETS,
-            sends_integers_bytewise=True,
-            has_takeoff_mode=True,
-        ),
-    }
-)
-"""By the autopilot number in the heartbeat.
-
-Paparazzi's altitude is above its local origin, that of the others above the ground.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class _Vehicle:
-    """A vehicle in a log: its system and component, its autopilot, and the number of its kind."""
-
-    system: int
-    component: int
-    autopilot: _Autopilot
-    kind: int
 
 
 def read_tlog(stream: BinaryIO) -> Recording:
     """Decode the messages of the vehicle that reports its position most often. Raises TrajectoryError if there is no
     heartbeat of a known autopilot."""
     data = contents(stream)
-    decoder = _Decoder(_find_vehicle(data))
+    decoder = _Decoder(find_vehicle(data))
     for message in messages(data, decoder.vehicle.autopilot.dialect, {*decoder.reports, *decoder.requests}):
         decoder.take(message)
     return decoder.recording()
-
-
-def _find_vehicle(data: Contents) -> _Vehicle:
-    from pymavlink.dialects.v20 import common  # a thousand classes
-
-    found: dict[tuple[int, int], _Vehicle] = {}
-    for message in messages(data, common, {"HEARTBEAT"}):
-        place, autopilot = (message.system, message.component), _AUTOPILOTS.get(int(message["autopilot"]))
-        if autopilot is not None and place not in found:
-            found[place] = _Vehicle(*place, autopilot, int(message["type"]))
-    if not found:
-        known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
-        raise refused(f"contains no MAVLink heartbeat of {known}", HINT)
-    number = common.MAVLINK_MSG_ID_LOCAL_POSITION_NED
-    positions = Counter((frame.system, frame.component) for frame in frames(data) if frame.message == number)
-    return max(found.values(), key=lambda each: positions[each.system, each.component])
 
 
 @dataclass(slots=True)
@@ -199,7 +105,7 @@ def _numbers() -> "array[float]":
 class _Decoder:
     """Messages of ground stations and the vehicle, in order of receipt."""
 
-    vehicle: _Vehicle
+    vehicle: LoggedVehicle
     reports: Mapping[str, Callable[[Message], None]] = field(init=False)
     requests: Mapping[str, Callable[[Message], None]] = field(init=False)
     _clock: _Clock = field(default_factory=_Clock)
@@ -261,14 +167,13 @@ class _Decoder:
             takes_off = "takeoff" in name.casefold().replace(" ", "").replace("_", "")
             kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
             self._events.append(Event(kind, time_s, f"the block {name}" if name else f"block {number}"))
-        kind_of_vehicle = f"a vehicle of MAVLink's type {self.vehicle.kind}"
         tables = {name: _table(name, values) for name, values in self._reports.items()}
         return Recording(
             title=f"MAVLink log of {autopilot.title}",
             autopilot=autopilot.name,
             clock="vehicle",
             system=self.vehicle.system,
-            frame="" if self.vehicle.kind in _COPTERS else _OTHER_KINDS.get(self.vehicle.kind, kind_of_vehicle),
+            frame=self.vehicle.other_frame,
             columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
             from_ground=autopilot.from_ground,
             sources=list(tables),
