@@ -4,7 +4,7 @@ It takes the same of them as our own link records: position, demanded throttle a
 flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter's reference is shaped again from these.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
 from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
-from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording, Rows
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, choose_parts, require_gains, usable_rows
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, require_gains
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import (
@@ -61,16 +61,19 @@ class _Reader:
         if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
             raise self._refused(*problems)
         rows = CopterRows.of(self.recording, self.autopilot)
-        history = ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned)
-        given, parts = choose_parts(rows.time_s, self._usable(rows), rows.is_reset, history, rows.target_rate_m_s)
-        if not parts:
-            raise self._refused(
-                Problem(
-                    "LOCAL_POSITION_NED",
-                    f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
-                    "in one of the messages, a jump in altitude or a parameter change",
-                )
-            )
+        none_found = (
+            f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
+            "in one of the messages, a jump in altitude or a parameter change"
+        )
+        given, parts = choose_parts(
+            rows.time_s,
+            self._conditions(rows),
+            rows.is_reset,
+            ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
+            rows.target_rate_m_s,
+            self._refused_for,
+            ("LOCAL_POSITION_NED", none_found),
+        )
         part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
         require_gains(given, self.autopilot.bounds, self._refused_for, lambda _: _READ_LATE)
         learned = self._learned(float(rows.time_s[part[0]]))
@@ -111,18 +114,13 @@ class _Reader:
             end_s=min(float(times_s[-1]) + _SETTLED_S, float(end_s)),
         )
 
-    def _usable(self, rows: CopterRows) -> Rows:
-        conditions = (
+    def _conditions(self, rows: CopterRows) -> Sequence[Condition]:
+        return (
             (rows.is_following, "HEARTBEAT", f"has no flight in {self._mode}"),
             (rows.is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
             (rows.is_off_ground, "LOCAL_POSITION_NED", f"never is {OFF_GROUND_M:g} m above the ground"),
-            (
-                rows.lean >= LARGEST_LEAN,
-                "ATTITUDE_TARGET",
-                "leans by more than 30° throughout the flight",
-            ),
+            (rows.lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
         )
-        return usable_rows(conditions, self._refused_for)
 
     def _sparse_messages(self) -> Iterator[Problem]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""

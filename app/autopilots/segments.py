@@ -21,6 +21,9 @@ Part = tuple[int, int]
 """First row, and the row after the last."""
 
 
+Condition = tuple[Rows, str, str]
+"""Rows that can be used, shape (n,), and the field and the reason of a refusal if there are none."""
+
 Refused = Callable[[str, str], Exception]
 """The error that a field and a reason make."""
 
@@ -30,17 +33,6 @@ def refusal(happened: str, hint: str, notes: Sequence[str] = ()) -> Refused:
     return lambda field, reason: TrajectoryError(
         happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),)
     )
-
-
-def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Refused) -> Rows:
-    """Rows, shape (n,), that meet all conditions. Raises what `refused` makes of the field and the reason of the first
-    condition that leaves none."""
-    usable = np.ones_like(conditions[0][0])
-    for condition, field, reason in conditions:
-        usable &= condition
-        if not usable.any():
-            raise refused(field, reason)
-    return usable
 
 
 def require_gains(
@@ -114,13 +106,27 @@ class Manoeuvres:
 
 
 def choose_parts(
-    time_s: Samples, usable: Rows, begins: Rows, history: ParameterHistory, acceleration_m_s2: Samples
+    time_s: Samples,
+    conditions: Sequence[Condition],
+    begins: Rows,
+    history: ParameterHistory,
+    acceleration_m_s2: Samples,
+    refused: Refused,
+    none_found: tuple[str, str],
 ) -> tuple[Parameters, list[Part]]:
-    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters; no parts if
-    none is long enough. Signals have shape (n,), `acceleration_m_s2` is that of the reference."""
+    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters.
+
+    Signals have shape (n,), `acceleration_m_s2` is that of the reference. Raises what `refused` makes of the field and
+    the reason of the first condition that leaves no row, or of `none_found` if no part is long enough.
+    """
+    usable = np.ones(len(time_s), dtype=np.bool_)
+    for condition, field, reason in conditions:
+        usable &= condition
+        if not usable.any():
+            raise refused(field, reason)
     parts = find_parts(time_s, usable, begins, history.times_s)
     if not parts:
-        return {}, []
+        raise refused(*none_found)
     manoeuvres = Manoeuvres(time_s, acceleration_m_s2)
     given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
     return given, manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])

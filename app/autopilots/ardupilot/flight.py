@@ -17,7 +17,6 @@ from app.autopilots.segments import (
     refusal,
     require_gains,
     thinned,
-    usable_rows,
 )
 from app.core.analysis.ardupilot_loop import SPACE, ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
@@ -79,14 +78,19 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         ),
         (lean >= LARGEST_LEAN, "ATT", "leans by more than 30° throughout the flight"),
     )
-    usable = usable_rows(conditions, refused)
-    given, chosen = choose_parts(time_s, usable, _is_reset(rows), history(recording, _USED), rows.a_d_m_s2)
-    if not chosen:
-        raise refused(
-            "PSCD",
-            f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} "
-            "s, a jump in altitude or a parameter change",
-        )
+    none_found = (
+        f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} "
+        "s, a jump in altitude or a parameter change"
+    )
+    given, chosen = choose_parts(
+        time_s,
+        conditions,
+        _is_reset(rows),
+        history(recording, _USED),
+        rows.a_d_m_s2,
+        refused,
+        ("PSCD", none_found),
+    )
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
     require_gains(given, SPACE.bounds, refused, _is_missing)
     rate_hz = given.get(LOOP_RATE, LOOP_RATE_HZ)

@@ -22,7 +22,6 @@ from app.autopilots.segments import (
     refusal,
     require_gains,
     thinned,
-    usable_rows,
 )
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import SPACE, Px4Loop
@@ -88,15 +87,19 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
         ),
         (lean >= LARGEST_LEAN, f"{TARGET}.thrust", "leans by more than 30° throughout the flight"),
     )
-    usable = usable_rows(conditions, refused)
-    history = recording.history({*LOOP_NAMES, VEHICLE})
-    given, chosen = choose_parts(time_s, usable, _is_reset(recording, rows), history, _manoeuvres(rows))
-    if not chosen:
-        raise refused(
-            TARGET,
-            f"has no {SHORTEST_PART_S:g} s with an altitude to follow between takeoff and landing, without a gap of "
-            f"{LONGEST_INTERVAL_S:g} s, a reset of the estimator or a parameter change",
-        )
+    none_found = (
+        f"has no {SHORTEST_PART_S:g} s with an altitude to follow between takeoff and landing, without a gap of "
+        f"{LONGEST_INTERVAL_S:g} s, a reset of the estimator or a parameter change"
+    )
+    given, chosen = choose_parts(
+        time_s,
+        conditions,
+        _is_reset(recording, rows),
+        recording.history({*LOOP_NAMES, VEHICLE}),
+        _manoeuvres(rows),
+        refused,
+        (TARGET, none_found),
+    )
     require_gains(given, SPACE.bounds, refused, lambda _: "is missing")
     parameters = parameters_from(given)
     limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
