@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
+from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
 from app.controller_checks.autopilot import Autopilot, Upload
 from app.controller_checks.results import (
     Result,
@@ -37,7 +38,6 @@ from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
 from app.logs.base import refused
 from app.logs.formats import Format
-from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
 from app.logs.paparazzi import HINT
 
 _MAX_DIGITS: Final = 9
