@@ -6,7 +6,7 @@ and thrusts are positive up.
 """
 
 from bisect import bisect_right
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Self
@@ -14,6 +14,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
 
@@ -22,6 +23,8 @@ LONGEST_INTERVAL_S: Final = 0.25
 
 Rows = NDArray[np.bool_]
 Parameters = Mapping[str, float]
+Refused = Callable[[str, str], InputError]
+"""The error that a field and a reason make."""
 
 
 class EventKind(StrEnum):
@@ -224,6 +227,11 @@ class Recording:
     def history(self, names: Collection[str]) -> ParameterHistory:
         """Of these parameters."""
         return ParameterHistory.of((each.time_s, each.name, each.value) for each in self.settings if each.name in names)
+
+
+def refusal(happened: str, hint: str, notes: Sequence[str] = (), error: type[InputError] = TrajectoryError) -> Refused:
+    """Errors of a log in which this happened, with `notes` after each reason."""
+    return lambda field, reason: error(happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),))
 
 
 def names_in(sets: GainSets) -> frozenset[str]:

@@ -6,8 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Rows
-from app.core.errors import Problem, TrajectoryError
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Refused, Rows
 from app.core.records.trajectory import Samples
 
 SHORTEST_PART_S: Final = 4.0
@@ -23,16 +22,6 @@ Part = tuple[int, int]
 
 Condition = tuple[Rows, str, str]
 """Rows that can be used, shape (n,), and the field and the reason of a refusal if there are none."""
-
-Refused = Callable[[str, str], Exception]
-"""The error that a field and a reason make."""
-
-
-def refusal(happened: str, hint: str, notes: Sequence[str] = ()) -> Refused:
-    """Errors of a log in which this happened, with `notes` after each reason."""
-    return lambda field, reason: TrajectoryError(
-        happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),)
-    )
 
 
 def require_gains(

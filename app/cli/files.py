@@ -83,12 +83,14 @@ def companion_of(file: Path) -> Path | None:
 
 
 def _read(file: Path, takeoff: int | None) -> Takeoff:
+    from app.autopilots.readers import read_takeoff  # noqa: PLC0415 - imports every reader
+
     try:
         with ExitStack() as files:
             stream = files.enter_context(file.open("rb"))
             beside = companion_of(file)
             companion = None if beside is None else files.enter_context(beside.open("rb"))
-            return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
+            return read_takeoff(stream, name=file.name, number=takeoff, companion=companion)
     except OSError as error:
         raise unreadable_error(file, error, "a log") from error
 

@@ -7,14 +7,12 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.log import LOOP, history
-from app.autopilots.recording import LONGEST_INTERVAL_S, EventKind, Recording, Rows
+from app.autopilots.recording import LONGEST_INTERVAL_S, EventKind, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
     LARGEST_LEAN,
     SHORTEST_PART_S,
-    Refused,
     choose_parts,
     jumps,
-    refusal,
     require_gains,
     thinned,
 )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history
-from app.autopilots.recording import Column, Recording
+from app.autopilots.recording import Column, Recording, refusal
 from app.core.control.ardupilot_log import LoopLog
 from app.core.control.ardupilot_parameters import (
     FIRMWARE_NAMES,
@@ -18,7 +18,7 @@ from app.core.control.ardupilot_parameters import (
     UNSUPPORTED,
     parameters_from,
 )
-from app.core.errors import InputError, Problem
+from app.core.errors import InputError
 from app.core.records.trajectory import Samples
 
 _MOTION: Final = (
@@ -29,6 +29,7 @@ _GUIDED: Final = 4
 _LIMITED: Final = 1
 _OPTIONS: Final = "GUID_OPTIONS"
 _WAYPOINT_NAVIGATION: Final = 1 << 6
+_HINT: Final = "Give ArduCopter's .bin log of a flight in GUIDED, recorded with NTUN, CTUN and PID in LOG_BITMASK."
 _SAME_LOOP_S: Final = 0.0012
 
 
@@ -37,19 +38,20 @@ def ardupilot_loop_log(recording: Recording, *, name: str) -> LoopLog:
 
     Raises InputError if there are none, or naming the message or parameter that is missing or not supported.
     """
+    refused = refusal(f"{name} cannot be compared with the replica.", _HINT, error=InputError)
     columns = recording.columns
     if not columns.keys() >= set(_MOTION) or columns["altitude_m"].source != "PSCD.PD":
-        raise _refused(name, "PSCD", "is missing: the log does not contain the vertical loop")
+        raise refused("PSCD", "is missing: the log does not contain the vertical loop")
     z, z_d, v, v_d, a_d, v_t = (columns[each].values for each in _MOTION)
     known = np.isfinite(np.sum((z, z_d, v, v_d, a_d, v_t), axis=0))
     started_anew = (z_d == z) & (v_d == v)
     rows, begin_s, end_s = _longest_in_guided(recording, np.flatnonzero(known & ~started_anew))
     if not rows.size:
-        raise _refused(name, "PSCD", "has no row in flight in GUIDED, the mode that the replica computes")
+        raise refused("PSCD", "has no row in flight in GUIDED, the mode that the replica computes")
     time_s = columns["altitude_m"].time_s[rows]
     values = history(recording, frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, LOOP_RATE, _OPTIONS})).at(float(time_s[0]))
     if "PSC_POSZ_P" not in values:
-        raise _refused(name, "PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
+        raise refused("PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
     rate_hz = values.get(LOOP_RATE, LOOP_RATE_HZ)
 
     def logged(name: str) -> Samples:
@@ -104,11 +106,3 @@ def _of_same_loop(column: Column | None, time_s: Samples) -> Samples:
     before = np.maximum(after - 1, 0)
     nearest = np.where(np.abs(at_s[after] - time_s) <= np.abs(at_s[before] - time_s), after, before)
     return np.where(np.abs(at_s[nearest] - time_s) <= _SAME_LOOP_S, column.values[nearest], np.nan)
-
-
-def _refused(name: str, field: str, reason: str) -> InputError:
-    return InputError(
-        f"{name} cannot be compared with the replica.",
-        hint="Give ArduCopter's .bin log of a flight in GUIDED, recorded with NTUN, CTUN and PID in LOG_BITMASK.",
-        problems=(Problem(field, reason),),
-    )

@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
-from app.autopilots.recording import LONGEST_INTERVAL_S, Parameters, Recording, Rows
+from app.autopilots.recording import LONGEST_INTERVAL_S, Parameters, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
     LARGEST_LEAN,
     SHORTEST_PART_S,
-    Refused,
     choose_parts,
     jumps,
-    refusal,
     require_gains,
     thinned,
 )

@@ -6,17 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.log import SOURCES, TARGET
-from app.autopilots.recording import Recording
+from app.autopilots.recording import Recording, refusal
 from app.core.control.px4 import FLIGHT, HOVER_MAX, HOVER_MIN, RAMP_UP
 from app.core.control.px4_log import LoopLog
 from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, UNSUPPORTED, Parameters, parameters_from
-from app.core.errors import InputError, Problem
+from app.core.errors import InputError
 from app.core.records.trajectory import Samples
 
 _NEEDED: Final = (
     "altitude_m", "climb_rate_m_s", "reference_m", "climb_rate_target_m_s", "acceleration_target_m_s2", "thrust_target",
     "takeoff_state",
 )  # fmt: skip
+_HINT: Final = (
+    "Give PX4's .ulg log of a flight with position control, recorded with bits 0 and 1 of SDLOG_PROFILE: with "
+    "bit 1 (estimator replay) every position is logged."
+)
 _SAME_RUN_S: Final = 0.004
 """A target is published at most so long after the position that it was computed from, the next position later."""
 
@@ -26,10 +30,11 @@ def px4_loop_log(recording: Recording, *, name: str) -> LoopLog:
 
     Raises InputError that names the topic or parameter that is missing or not supported.
     """
+    refused = refusal(f"{name} cannot be compared with the replica.", _HINT, error=InputError)
     columns = recording.columns
     for each in _NEEDED:
         if each not in columns:
-            raise _refused(name, SOURCES[each].message, "is missing")
+            raise refused(SOURCES[each].message, "is missing")
     position_s, time_s = columns["altitude_m"].time_s, columns["thrust_target"].time_s
     takeoff = recording.at("takeoff_state", time_s)
     place = np.searchsorted(position_s, time_s, side="right") - 1
@@ -38,7 +43,7 @@ def px4_loop_log(recording: Recording, *, name: str) -> LoopLog:
     rows = np.flatnonzero(fresh & (takeoff >= RAMP_UP) & np.isfinite(thrust))
     rows = rows[np.diff(place[rows], prepend=-1) > 0]
     if not rows.size:
-        raise _refused(name, TARGET, "has no row in flight beside a position")
+        raise refused(TARGET, "has no row in flight beside a position")
     begin_s = float(time_s[rows[0]])
     history = recording.history({*FIRMWARE_NAMES, *UNSUPPORTED})
     changes_s = [change_s for change_s in history.times_s if change_s > begin_s]
@@ -46,7 +51,7 @@ def px4_loop_log(recording: Recording, *, name: str) -> LoopLog:
     values = history.at(begin_s)
     for gain in GAINS:
         if gain not in values:
-            raise _refused(name, gain, "is missing")
+            raise refused(gain, "is missing")
     parameters = parameters_from(values)
     set_z_m = -columns["reference_m"].values
     set_vz_m_s, set_az_m_s2, known = _set_points(recording, time_s, set_z_m)
@@ -115,12 +120,3 @@ def _hover(recording: Recording, time_s: Samples, takeoff: Samples, parameters: 
     in_flight = np.where(none_yet, parameters.hover_thrust, np.nan)
     in_flight[around] = np.interp(time_s[around], at_s, estimates)
     return np.where(takeoff < FLIGHT, on_ground, in_flight)
-
-
-def _refused(name: str, field: str, reason: str) -> InputError:
-    return InputError(
-        f"{name} cannot be compared with the replica.",
-        hint="Give PX4's .ulg log of a flight with position control, recorded with bits 0 and 1 of SDLOG_PROFILE: with "
-        "bit 1 (estimator replay) every position is logged.",
-        problems=(Problem(field, reason),),
-    )

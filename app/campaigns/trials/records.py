@@ -7,7 +7,7 @@ trial.
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -201,18 +201,6 @@ def _classify(row: TrialRow, refusal: str) -> None:
         set_trial_state(row, TrialState.INVALID, reason=refusal)
     elif not row.glitches:
         set_trial_state(row, TrialState.VALID)
-
-
-def read_record(
-    stream: BinaryIO, *, name: str = "", takeoff: int | None = None, companion: BinaryIO | None = None
-) -> Takeoff:
-    """Read a takeoff from a log of any format.
-
-    Raises TrajectoryError; where the log holds several takeoffs, it names them.
-    """
-    from app.autopilots.readers import read_takeoff  # noqa: PLC0415 - imports every reader
-
-    return read_takeoff(stream, name=name, number=takeoff, companion=companion)
 
 
 def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
