@@ -16,6 +16,7 @@ from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI
+from app.autopilots.readers import read_takeoff
 from app.campaigns import landscapes, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
@@ -125,7 +126,7 @@ class States:
         def upload(session: Session) -> int:
             proposal = _proposed(session, campaign_id)
             trial = trials.create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
-            flown = records.read_record(io.BytesIO(csv(proposal.gains)), name="flight.csv")
+            flown = read_takeoff(io.BytesIO(csv(proposal.gains)), name="flight.csv")
             records.import_record(session, trial.id, flown)
             _propose(session, campaign_id)
             return trial.id

@@ -22,7 +22,7 @@ _START: Final = ("z_m", "v_m_s", "a_m_s2", "throttle")
 
 
 def is_ardupilot_trace(beginning: bytes) -> bool:
-    """Whether text with this beginning is such a run."""
+    """Whether a file with this beginning is such a run."""
     return has_columns(beginning, COLUMNS)
 
 

@@ -31,7 +31,7 @@ _HINT: Final = (
 
 
 def is_px4_trace(beginning: bytes) -> bool:
-    """Whether text with this beginning is such a run."""
+    """Whether a file with this beginning is such a run."""
     return has_columns(beginning, COLUMNS)
 
 

@@ -5,11 +5,11 @@ from typing import Final, Self
 
 import numpy as np
 
+from app.autopilots.copter_autopilots import CopterAutopilot
+from app.autopilots.recording import Recording, Rows, held
+from app.autopilots.segments import Part, jumps
 from app.core.analysis.segment import LEAD_S
 from app.core.records.trajectory import Samples, Trajectory
-from app.logs.copter_autopilots import CopterAutopilot
-from app.logs.copter_telemetry import Telemetry
-from app.logs.flight_parts import LONGEST_INTERVAL_S, Part, Rows, beside, held, jumps
 
 _HEARTBEAT_HOLDS_S: Final = 5.0
 OFF_GROUND_M: Final = 0.5
@@ -34,23 +34,24 @@ class CopterRows:
     is_disarmed: Rows
 
     @classmethod
-    def of(cls, heard: Telemetry, autopilot: CopterAutopilot) -> Self:
-        """Those of a vehicle's reports."""
-        time_s, altitude_m, climb_rate_m_s = heard.positions.T
-        throttle, lean = (beside(heard.throttles[:, 0], heard.throttles[:, column], time_s) for column in (1, 2))
-        target_m = held(heard.targets[:, 0], heard.targets[:, 1], time_s, longest_s=LONGEST_INTERVAL_S)
-        error_m = beside(heard.errors[:, 0], heard.errors[:, 1], time_s)
-        armed = held(heard.states[:, 0], heard.states[:, 1], time_s)
+    def of(cls, recording: Recording, autopilot: CopterAutopilot) -> Self:
+        """Those of a vehicle's reports, which has all that its autopilot needs."""
+        columns = recording.columns
+        time_s, altitude_m = columns["altitude_m"].time_s, columns["altitude_m"].values
+        throttle, lean = (columns[each].beside(time_s) for each in ("demanded_throttle", "lean"))
+        target_m = recording.at("target_altitude_m", time_s)
         return cls(
             time_s=time_s,
             altitude_m=altitude_m,
-            climb_rate_m_s=climb_rate_m_s,
+            climb_rate_m_s=columns["climb_rate_m_s"].values,
             throttle=throttle if autopilot.shapes_reference else throttle * lean,
             lean=lean,
             target_m=target_m,
-            reference_m=altitude_m + error_m if autopilot.shapes_reference else target_m,
-            is_following=follows(heard, autopilot, time_s),
-            is_disarmed=armed == 0.0,
+            reference_m=altitude_m + columns["reference_error_m"].beside(time_s)
+            if autopilot.shapes_reference
+            else target_m,
+            is_following=follows(recording, autopilot, time_s),
+            is_disarmed=recording.at("is_armed", time_s) == 0.0,
         )
 
     @property
@@ -89,14 +90,11 @@ class CopterRows:
         return Trajectory(self.time_s[rows] - self.time_s[part[0]], channels, "tlog", "vehicle")
 
 
-def follows(heard: Telemetry, autopilot: CopterAutopilot, time_s: Samples) -> Rows:
+def follows(recording: Recording, autopilot: CopterAutopilot, time_s: Samples) -> Rows:
     """Times, shape (n,), between two heartbeats with armed motors in the mode with set points, or after the last."""
-    at_s, armed, modes = heard.states.T
-    following = np.array(
-        [is_armed > 0.0 and autopilot.number_of_mode(int(mode)) == autopilot.mode
-         for is_armed, mode in zip(armed.tolist(), modes.tolist(), strict=True)],
-        dtype=np.float64,
-    )  # fmt: skip
+    armed, modes = recording.columns["is_armed"], recording.columns["mode"]
+    at_s, is_mode = armed.time_s, [autopilot.number_of_mode(int(mode)) == autopilot.mode for mode in modes.values]
+    following = ((armed.values > 0.0) & is_mode).astype(np.float64)
     before = held(at_s, following, time_s, longest_s=_HEARTBEAT_HOLDS_S)
     after = held(-at_s[::-1], following[::-1], -time_s)
     return np.asarray((before == 1.0) & (np.isnan(after) | (after == 1.0)))

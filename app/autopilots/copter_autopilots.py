@@ -7,14 +7,6 @@ from typing import Final
 
 from app.core.analysis import ardupilot_loop, px4_loop
 from app.core.control import ardupilot_parameters, px4_parameters
-from app.logs.copter_telemetry import (
-    ARDUPILOT,
-    ATTITUDE_TARGET,
-    LOCAL_POSITION_NED,
-    NAV_CONTROLLER_OUTPUT,
-    POSITION_TARGET_LOCAL_NED,
-    PX4,
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +23,7 @@ class CopterAutopilot:
     number_of_mode: Callable[[int], int]
     mode: int
     modes: Mapping[int, str]
-    messages: Sequence[int]
+    messages: Sequence[str]
     bounds: Mapping[str, tuple[float, float]]
     required: Sequence[str]
     kept: Sequence[str]
@@ -52,14 +44,6 @@ _ASK: Final = (
     "MAV_CMD_SET_MESSAGE_INTERVAL with 20000 µs for {messages}{or_else}. The vehicle's own log ({own}) needs none of "
     "this."
 )
-MESSAGE_NAMES: Final[Mapping[int, str]] = MappingProxyType(
-    {
-        LOCAL_POSITION_NED: "LOCAL_POSITION_NED",
-        NAV_CONTROLLER_OUTPUT: "NAV_CONTROLLER_OUTPUT",
-        ATTITUDE_TARGET: "ATTITUDE_TARGET",
-        POSITION_TARGET_LOCAL_NED: "POSITION_TARGET_LOCAL_NED",
-    }
-)
 _IN_TAKEOFFS: Final = frozenset(
     {"TKOFF_SLEW_TIME", "TKOFF_THR_MAX", "MPC_TKO_RAMP_T", "COM_SPOOLUP_TIME", "MPC_LAND_SPEED"}
 )
@@ -69,15 +53,15 @@ def _in_flight(*names: str) -> Sequence[str]:
     return tuple(name for name in names if name not in _IN_TAKEOFFS)
 
 
-AUTOPILOTS: Final[Mapping[int, CopterAutopilot]] = MappingProxyType(
+AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
     {
-        ARDUPILOT: CopterAutopilot(
+        "ardupilot": CopterAutopilot(
             number_of_mode=lambda mode: mode,
             mode=4,
             modes=MappingProxyType(
                 {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
             ),
-            messages=(LOCAL_POSITION_NED, NAV_CONTROLLER_OUTPUT, ATTITUDE_TARGET, POSITION_TARGET_LOCAL_NED),
+            messages=("LOCAL_POSITION_NED", "NAV_CONTROLLER_OUTPUT", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
             bounds=ardupilot_loop.SPACE.bounds,
             required=(*ardupilot_loop.SPACE.bounds, _LEARNED),
             learned=_LEARNED,
@@ -95,11 +79,11 @@ AUTOPILOTS: Final[Mapping[int, CopterAutopilot]] = MappingProxyType(
                 own=".bin",
             ),
         ),
-        PX4: CopterAutopilot(
+        "px4": CopterAutopilot(
             number_of_mode=lambda mode: mode >> 16 & 0xFF,
             mode=6,
             modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
-            messages=(LOCAL_POSITION_NED, ATTITUDE_TARGET, POSITION_TARGET_LOCAL_NED),
+            messages=("LOCAL_POSITION_NED", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
             bounds=px4_loop.SPACE.bounds,
             required=tuple(px4_loop.SPACE.bounds),
             learned="",

@@ -1,16 +1,14 @@
 """Parts of a logged flight that can be analysed: rows that follow each other without a gap, a jump or a change."""
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Self
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Refused, Rows
 from app.core.records.trajectory import Samples
 
-LONGEST_INTERVAL_S: Final = 0.25
 SHORTEST_PART_S: Final = 4.0
 LONGEST_FLIGHT_S: Final = 120.0
 LARGEST_LEAN: Final = 0.866
@@ -21,76 +19,27 @@ _ALREADY_THIN: Final = 0.9
 Part = tuple[int, int]
 """First row, and the row after the last."""
 
-Rows = NDArray[np.bool_]
 
-Parameters = Mapping[str, float]
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterHistory:
-    """The values in force from each time on, s, increasing."""
-
-    times_s: Sequence[float]
-    values: Sequence[Parameters]
-
-    @classmethod
-    def of(cls, logged: Iterable[tuple[float, str, float]]) -> Self:
-        """The history of logged values (time, name, value), in order of time."""
-        times_s, history = [], []
-        values: Parameters = {}
-        for time_s, name, value in logged:
-            if np.isfinite(value) and values.get(name) != value:
-                values = {**values, name: value}
-                times_s.append(time_s)
-                history.append(values)
-        return cls(times_s, history)
-
-    def at(self, time_s: float) -> Parameters:
-        """The values at a time."""
-        place = bisect_right(self.times_s, time_s) - 1
-        return self.values[place] if place >= 0 else {}
+Condition = tuple[Rows, str, str]
+"""Rows that can be used, shape (n,), and the field and the reason of a refusal if there are none."""
 
 
-def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Callable[[str, str], Exception]) -> Rows:
-    """Rows, shape (n,), that meet all conditions. Raises what `refused` makes of the field and the reason of the first
-    condition that leaves none."""
-    usable = np.ones_like(conditions[0][0])
-    for condition, field, reason in conditions:
-        usable &= condition
-        if not usable.any():
-            raise refused(field, reason)
-    return usable
+def require_gains(
+    given: Parameters, bounds: Mapping[str, tuple[float, float]], refused: Refused, absent: Callable[[str], str]
+) -> None:
+    """Require that the loop had all gains of the search, positive where the search has no zero. Raises what `refused`
+    makes of the gain and the reason; `absent` gives that of one that is missing."""
+    for each, (least, _) in bounds.items():
+        if each not in given:
+            raise refused(each, absent(each))
+        if given[each] < 0.0 or (least and not given[each]):
+            raise refused(each, f"must be positive, got {given[each]:g}")
 
 
 def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> Rows:
     """Rows, shape (n,), whose value differs by more than `largest` from what its rate made of the one before."""
     followed = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time_s)
     return np.append(False, np.abs(np.diff(values) - followed) > largest)
-
-
-def increasing(at_s: Samples) -> NDArray[np.int64]:
-    """Rows, shape (k,), each later than all before it."""
-    return np.flatnonzero(np.diff(np.maximum.accumulate(at_s), prepend=-np.inf) > 0.0)
-
-
-def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:
-    """Values known at `at_s`, shape (k,) each, which increases, at other times, shape (n,), linear between its rows;
-    NaN outside them, and between two that are too far apart."""
-    if len(at_s) < 2:
-        return np.full(len(time_s), np.nan)
-    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
-    found = np.interp(time_s, at_s, values, left=np.nan, right=np.nan)
-    found[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
-    return found
-
-
-def held(at_s: Samples, values: Samples, time_s: Samples, *, longest_s: float = np.inf) -> Samples:
-    """The value last reported at each time, shape (n,), of those at `at_s`, shape (k,), which increases; NaN before the
-    first, and where the last is older than `longest_s`."""
-    last = np.searchsorted(at_s, time_s, side="right") - 1
-    if not len(at_s):
-        return np.full(len(time_s), np.nan)
-    return np.where((last >= 0) & (time_s - at_s[last] <= longest_s), values[last], np.nan)
 
 
 def find_parts(time_s: Samples, usable: Rows, begins: Rows, cuts_s: Sequence[float]) -> list[Part]:
@@ -146,13 +95,27 @@ class Manoeuvres:
 
 
 def choose_parts(
-    time_s: Samples, usable: Rows, begins: Rows, history: ParameterHistory, acceleration_m_s2: Samples
+    time_s: Samples,
+    conditions: Sequence[Condition],
+    begins: Rows,
+    history: ParameterHistory,
+    acceleration_m_s2: Samples,
+    refused: Refused,
+    none_found: tuple[str, str],
 ) -> tuple[Parameters, list[Part]]:
-    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters; no parts if
-    none is long enough. Signals have shape (n,), `acceleration_m_s2` is that of the reference."""
+    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters.
+
+    Signals have shape (n,), `acceleration_m_s2` is that of the reference. Raises what `refused` makes of the field and
+    the reason of the first condition that leaves no row, or of `none_found` if no part is long enough.
+    """
+    usable = np.ones(len(time_s), dtype=np.bool_)
+    for condition, field, reason in conditions:
+        usable &= condition
+        if not usable.any():
+            raise refused(field, reason)
     parts = find_parts(time_s, usable, begins, history.times_s)
     if not parts:
-        return {}, []
+        raise refused(*none_found)
     manoeuvres = Manoeuvres(time_s, acceleration_m_s2)
     given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
     return given, manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])

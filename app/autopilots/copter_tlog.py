@@ -1,16 +1,20 @@
-"""Reader of the altitude steps in a telemetry log (.tlog) of an ArduCopter or PX4.
+"""The altitude steps in a telemetry log (.tlog) of an ArduCopter or PX4.
 
 It takes the same of them as our own link records: position, demanded throttle and the autopilot's reference, of a
 flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter's reference is shaped again from these.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import BinaryIO, Final
+from typing import Final
 
 import numpy as np
 
+from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
+from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, require_gains
+from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import (
     LARGEST_INTERVAL_S,
@@ -25,35 +29,8 @@ from app.core.control.ardupilot_parameters import NEWER_NAMES, in_newer_names, i
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
 from app.core.records.trajectory import Samples, Trajectory
-from app.logs.base import Contents, contents
-from app.logs.copter_autopilots import AUTOPILOTS, MESSAGE_NAMES, CopterAutopilot
-from app.logs.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
-from app.logs.copter_telemetry import (
-    ATTITUDE_TARGET,
-    LOCAL_POSITION_NED,
-    NAV_CONTROLLER_OUTPUT,
-    POSITION_TARGET_LOCAL_NED,
-    Sender,
-    Telemetry,
-    find_vehicle,
-)
-from app.logs.flight_parts import (
-    LARGEST_LEAN,
-    LONGEST_INTERVAL_S,
-    SHORTEST_PART_S,
-    ParameterHistory,
-    Parameters,
-    Rows,
-    choose_parts,
-    usable_rows,
-)
-from app.logs.tlog_frames import is_tlog
 
-_COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
-"""Kinds of vehicles with several rotors, in a heartbeat."""
-_OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
-    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
-)
+_READ_LATE: Final = "was changed after the flight, and was not read before"
 _STEPS_APART_S: Final = 1.0
 _SETTLED_S: Final = 6.5
 """Hover after the last step that is analysed."""
@@ -61,54 +38,47 @@ _INTERRUPTED_S: Final = 1.0
 """Longer intervals between two messages do not count for their rate."""
 
 
-def is_copter_tlog(content: Contents) -> bool:
-    """Whether this is a telemetry log of an ArduPilot or PX4."""
-    vehicle = find_vehicle(content) if is_tlog(content[:16]) else None
-    return vehicle is not None and vehicle.autopilot in AUTOPILOTS
-
-
-def read_copter_tlog(stream: BinaryIO, *, name: str) -> LoggedFlight:
-    """Read the part with the largest altitude changes, at most 120 s under the same parameters, of the vehicle that
-    reports its position most often; the log must be one of these (`is_copter_tlog`).
+def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
+    """The part with the largest altitude changes, at most 120 s under the same parameters, of an ArduPilot or PX4; None
+    of another autopilot.
 
     Raises TrajectoryError naming every message, mode and parameter that is missing, or InputError for a parameter that
     is not supported.
     """
-    data = contents(stream)
-    vehicle = find_vehicle(data)
-    assert vehicle is not None
-    return _Reader(name, vehicle, AUTOPILOTS[vehicle.autopilot], Telemetry.of(data, vehicle)).read()
+    autopilot = AUTOPILOTS.get(recording.autopilot)
+    return None if autopilot is None else _Reader(name, recording, autopilot).read()
 
 
 @dataclass(frozen=True, slots=True)
 class _Reader:
     name: str
-    vehicle: Sender
+    recording: Recording
     autopilot: CopterAutopilot
-    heard: Telemetry
 
     def read(self) -> LoggedFlight:
-        if self.vehicle.kind not in _COPTERS:
-            kind = _OTHER_KINDS.get(self.vehicle.kind, f"a vehicle of MAVLink's type {self.vehicle.kind}")
-            raise self._refused(Problem("file", f"is the log of {kind}, not of a copter with several rotors"))
+        if frame := self.recording.frame:
+            raise self._refused(Problem("file", f"is the log of {frame}, not of a copter with several rotors"))
         if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
             raise self._refused(*problems)
-        rows = CopterRows.of(self.heard, self.autopilot)
-        history = ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned)
-        given, parts = choose_parts(rows.time_s, self._usable(rows), rows.is_reset, history, rows.target_rate_m_s)
-        if not parts:
-            raise self._refused(
-                Problem(
-                    MESSAGE_NAMES[LOCAL_POSITION_NED],
-                    f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
-                    "in one of the messages, a jump in altitude or a parameter change",
-                )
-            )
+        rows = CopterRows.of(self.recording, self.autopilot)
+        none_found = (
+            f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
+            "in one of the messages, a jump in altitude or a parameter change"
+        )
+        given, parts = choose_parts(
+            rows.time_s,
+            self._conditions(rows),
+            rows.is_reset,
+            ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
+            rows.target_rate_m_s,
+            self._refused_for,
+            ("LOCAL_POSITION_NED", none_found),
+        )
         part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
-        self._require_gains(given)
+        require_gains(given, self.autopilot.bounds, self._refused_for, lambda _: _READ_LATE)
         learned = self._learned(float(rows.time_s[part[0]]))
         flight = self._flight(rows.trajectory(part), {**given, **learned})
-        return replace(flight, assumed=() if self.heard.has_all_parameters else self._assumed(given))
+        return replace(flight, assumed=() if self.recording.has_all_parameters else self._assumed(given))
 
     def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
         if self.autopilot.shapes_reference:
@@ -116,7 +86,7 @@ class _Reader:
             return read_ardupilot(loop, trajectory, self._steps(trajectory))
         hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
         whole = Steps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
-        return read_px4(replace(px4_loop(given), vehicle=self.vehicle.system), trajectory, whole)
+        return read_px4(replace(px4_loop(given), vehicle=self.recording.system), trajectory, whole)
 
     def _steps(self, trajectory: Trajectory) -> Steps:
         """The steps from the first one before which the vehicle was at rest, to some time after the last; a step right
@@ -124,7 +94,7 @@ class _Reader:
         time_s, target_m = trajectory.time_s, trajectory["set_point_m"]
         found = steps_in(trajectory)
         rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
-        field = MESSAGE_NAMES[POSITION_TARGET_LOCAL_NED]
+        field = "POSITION_TARGET_LOCAL_NED"
         if not rows:
             raise self._refused(
                 Problem(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
@@ -144,46 +114,34 @@ class _Reader:
             end_s=min(float(times_s[-1]) + _SETTLED_S, float(end_s)),
         )
 
-    def _usable(self, rows: CopterRows) -> Rows:
-        conditions = (
+    def _conditions(self, rows: CopterRows) -> Sequence[Condition]:
+        return (
             (rows.is_following, "HEARTBEAT", f"has no flight in {self._mode}"),
-            (rows.is_known, MESSAGE_NAMES[LOCAL_POSITION_NED], "has no rows beside all the other messages"),
-            (rows.is_off_ground, MESSAGE_NAMES[LOCAL_POSITION_NED], f"never is {OFF_GROUND_M:g} m above the ground"),
-            (
-                rows.lean >= LARGEST_LEAN,
-                MESSAGE_NAMES[ATTITUDE_TARGET],
-                "leans by more than 30° throughout the flight",
-            ),
+            (rows.is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
+            (rows.is_off_ground, "LOCAL_POSITION_NED", f"never is {OFF_GROUND_M:g} m above the ground"),
+            (rows.lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
         )
-        return usable_rows(conditions, lambda field, reason: self._refused(Problem(field, reason)))
 
     def _sparse_messages(self) -> Iterator[Problem]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
-        reports = {
-            LOCAL_POSITION_NED: self.heard.positions,
-            NAV_CONTROLLER_OUTPUT: self.heard.errors,
-            ATTITUDE_TARGET: self.heard.throttles,
-            POSITION_TARGET_LOCAL_NED: self.heard.targets,
-        }
-        for number in self.autopilot.messages:
-            at_s = reports[number][:, 0]
-            rate_hz = self._rate_hz(at_s)
-            if not len(at_s):
-                yield Problem(MESSAGE_NAMES[number], "is missing")
+        for message in self.autopilot.messages:
+            found = [each.time_s for name, each in self.recording.columns.items() if SOURCES[name].message == message]
+            rate_hz = self._rate_hz(found[0]) if found else 0.0
+            if not found:
+                yield Problem(message, "is missing")
             elif rate_hz * LARGEST_INTERVAL_S < 1.0:
                 rate = f"{rate_hz:.1f} times" if rate_hz else "less than once"
-                yield Problem(
-                    MESSAGE_NAMES[number], f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed"
-                )
+                yield Problem(message, f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed")
 
     def _rate_hz(self, at_s: Samples) -> float:
-        following = follows(self.heard, self.autopilot, at_s)
+        following = follows(self.recording, self.autopilot, at_s)
         intervals_s = np.diff(at_s[following] if following.any() else at_s)
         counted = intervals_s[intervals_s <= _INTERRUPTED_S]
         return 1.0 / float(counted.mean()) if counted.size else 0.0
 
     def _missing_mode(self) -> Iterator[Problem]:
-        flown = [self.autopilot.number_of_mode(int(mode)) for _, armed, mode in self.heard.states.tolist() if armed]
+        armed, mode = self.recording.columns["is_armed"], self.recording.columns["mode"]
+        flown = [self.autopilot.number_of_mode(int(each)) for each in mode.values[armed.values > 0.0].tolist()]
         if not flown:
             yield Problem("HEARTBEAT", "never reports armed motors")
         elif self.autopilot.mode not in flown:
@@ -201,16 +159,11 @@ class _Reader:
                 renamed = f", nor {newer} of release 4.7" if newer != each else ""
                 yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
 
-    def _require_gains(self, given: Parameters) -> None:
-        for each, (least, _) in self.autopilot.bounds.items():
-            if each not in given:
-                raise self._refused(Problem(each, "was changed after the flight, and was not read before"))
-            if given[each] < 0.0 or (least and not given[each]):
-                raise self._refused(Problem(each, f"must be positive, got {given[each]:g}"))
-
     def _settings(self) -> Iterator[tuple[float, str, float]]:
-        for time_s, name, value in self.heard.settings:
-            older, number = in_older_names(name, value)
+        """Parameters by their older names, in order of time; values that nobody had written before hold from −∞ on."""
+        logged = ((-np.inf if each.held_before else each.time_s, each) for each in self.recording.settings)
+        for time_s, each in sorted(logged, key=lambda timed: timed[0]):
+            older, number = in_older_names(each.name, each.value)
             if older in self.autopilot.kept:
                 yield time_s, older, number
 
@@ -227,11 +180,14 @@ class _Reader:
 
     @property
     def _has_newer_names(self) -> bool:
-        return any(name in NEWER_NAMES for _, name, _ in self.heard.settings)
+        return any(each.name in NEWER_NAMES for each in self.recording.settings)
 
     @property
     def _mode(self) -> str:
         return self.autopilot.mode_name(self.autopilot.mode)
+
+    def _refused_for(self, field: str, reason: str) -> TrajectoryError:
+        return self._refused(Problem(field, reason))
 
     def _refused(self, *problems: Problem) -> TrajectoryError:
         return TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)

@@ -1,23 +1,23 @@
-"""Detection of takeoffs in a flight log: where each begins and ends, the gains it was flown with, and its record.
+"""Detection of takeoffs in a recording: where each begins and ends, the gains it was flown with, and its record.
 
-A reader converts a log to a `FlightLog`; takeoffs are detected here in the same way for every format. If the autopilot
+Takeoffs are detected in the same way for every format. If the autopilot
 logs when it was in the air, each such interval that rises by 0.5 m is a flight, and nothing else is: an estimate that
 settles at boot, or jumps at a touchdown, is not. Otherwise flights are detected by altitude, while the motors were
 armed if that is known: off the ground by 0.15 m and on to at least 0.5 m. A flight begins with the takeoff command if
 the log contains one, else at lift-off; it ends with the landing command, a change of a gain, or on the ground.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from app.autopilots.recording import Event, EventKind, Recording, Span
 from app.core.errors import Problem, TrajectoryError
 from app.core.formatting import format_gains, times
 from app.core.policy import Gains
-from app.core.records.trajectory import Samples, Trajectory
-from app.logs.base import GainSets
+from app.core.records.trajectory import CHANNEL_UNITS, Samples, Trajectory
 
 NEAR_GROUND_M: Final = 0.15
 HIGHEST_HOP_M: Final = 0.5
@@ -34,61 +34,9 @@ _BEFORE_S: Final = 1.0
 _COMMAND_AHEAD_S: Final = 10.0
 _LISTED: Final = 50
 _LARGEST: Final = 1e6
+_LANDINGS: Final = (EventKind.LANDING, EventKind.MOTORS_OFF)
+_ENDS: Final = (EventKind.COMMAND, EventKind.MODE, *_LANDINGS, EventKind.BOOT)
 _ALTITUDES: Final = frozenset({"altitude_m", "reference_m", "set_point_m"})
-
-
-@dataclass(frozen=True, slots=True)
-class LogEvent:
-    """An event in seconds of the log, and its description: "the block Takeoff"."""
-
-    time_s: float
-    what: str
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """A gain that the vehicle used from this time on; NaN if it is unknown from then on."""
-
-    time_s: float
-    name: str
-    value: float
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """An interval in which a condition held, in seconds of the log; `end_s` is infinite if the log ends first."""
-
-    begin_s: float
-    end_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlightLog:
-    """Contents of any log, in seconds of the log's own `clock` (`vehicle` or `ground`), altitude up.
-
-    `time_s` has shape (n,) and may repeat or step back. `channels`, each of shape (n,) with NaN for missing values,
-    include `altitude_m`. `gain_sets` are alternative sets of gains; the first one whose names are all known
-    applies. `from_ground`: measure the altitude from where the vehicle stood. `starts` (takeoff commands),
-    `ends` (commands that end the flight) and `landings` (reported by the autopilot) may be empty. `in_air` are the
-    intervals from lift-off to touchdown, `armed` those with the motors armed, both as reported by the autopilot and in
-    order; None if the log does not report them. `blocks` are the intervals in blocks of a flight plan, each from the
-    command that activated it: without a takeoff command, the block in which the vehicle lifts off was one.
-    """
-
-    title: str
-    clock: str
-    time_s: Samples
-    channels: Mapping[str, Samples]
-    from_ground: bool
-    gain_sets: GainSets = ()
-    settings: Sequence[Setting] = ()
-    starts: Sequence[LogEvent] = ()
-    ends: Sequence[LogEvent] = ()
-    landings: Sequence[LogEvent] = ()
-    in_air: Sequence[Span] | None = None
-    armed: Sequence[Span] | None = None
-    blocks: Sequence[Span] = ()
-    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +69,7 @@ class Takeoff:
         )
 
 
-def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
+def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
     """Find the takeoffs, ordered by time. Raises TrajectoryError if there is none."""
     time_s, channels = _usable(log)
     altitude_m = channels["altitude_m"]
@@ -157,19 +105,6 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
     return tuple(found)
 
 
-def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:
-    """Intervals in which a condition held, from timed reports of it."""
-    spans: list[Span] = []
-    since_s: float | None = None
-    for time_s, holds in states:
-        if holds and since_s is None:
-            since_s = time_s
-        elif not holds and since_s is not None:
-            spans.append(Span(since_s, time_s))
-            since_s = None
-    return spans if since_s is None else [*spans, Span(since_s, np.inf)]
-
-
 def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
     """The takeoff with this number, or the only one. Raises TrajectoryError that lists them if it is not clear."""
     if number is None and len(takeoffs) == 1:
@@ -184,36 +119,35 @@ def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
     )
 
 
-def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
-    """Samples with a finite altitude and increasing time. Raises TrajectoryError if too few remain."""
-    altitude_m = log.channels["altitude_m"]
+def _usable(log: Recording) -> tuple[Samples, Mapping[str, Samples]]:
+    """Samples with a valid altitude, and the other channels beside it. Raises TrajectoryError if too few remain."""
+    altitude = log.columns["altitude_m"]
     with np.errstate(invalid="ignore"):
-        good = np.isfinite(altitude_m) & np.isfinite(log.time_s) & (np.abs(altitude_m) <= _LARGEST)
-    time_s = log.time_s[good]
-    rising = np.ones(len(time_s), dtype=np.bool_)
-    rising[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
-    time_s = time_s[rising]
+        good = np.isfinite(altitude.values) & (np.abs(altitude.values) <= _LARGEST)
+    good &= log.at("altitude_is_valid", altitude.time_s) != 0.0
+    time_s = altitude.time_s[good]
     if len(time_s) < MIN_SAMPLES:
         raise TrajectoryError(
             f"The log contains {len(time_s)} usable samples of the altitude; a flight needs at least {MIN_SAMPLES}.",
             hint="Record the vehicle's local position at 20 Hz or more during the whole flight.",
             problems=(Problem("altitude_m", "has too few samples"),),
         )
-    return time_s, {name: values[good][rising] for name, values in log.channels.items()}
+    channels = (name for name in log.columns if name in CHANNEL_UNITS)
+    return time_s, {name: log.columns[name].at(altitude.time_s)[good] for name in channels}
 
 
-def _where_looked(log: FlightLog) -> str:
+def _where_looked(log: Recording) -> str:
     if log.in_air is None:
         return f"in {_RISE_S[-1]:g} s{'' if log.armed is None else ' while it was armed'}"
     return f"while it was in the air ({times(len(log.in_air))}, from the autopilot's status)"
 
 
-def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:
+def _flights(log: Recording, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:
     """Indices of the last sample on the ground before each flight, and of the first one down again (or the last)."""
     if log.in_air is not None:
         yield from _flights_in_air(time_s, altitude_m, log.in_air)
         return
-    landings_s = [landing.time_s for landing in log.landings]
+    landings_s = [landing.time_s for landing in log.events_of(*_LANDINGS)]
     for armed in (Span(-np.inf, np.inf),) if log.armed is None else log.armed:
         first, past = _between(time_s, armed.begin_s, armed.end_s)
         for stood, down in _flights_by_altitude(time_s[first:past], altitude_m[first:past], landings_s):
@@ -266,31 +200,31 @@ def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int
     return len(time_s)
 
 
-def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[LogEvent, bool]:
+def _beginning(log: Recording, stood_s: float, free_from_s: float) -> tuple[Event, bool]:
     """The event from which time counts, and whether it is a command: the first one, since later ones repeat it."""
     ahead_s = max(free_from_s, stood_s - _COMMAND_AHEAD_S)
-    commands = [start for start in log.starts if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
+    commands = [start for start in log.events_of(EventKind.TAKEOFF) if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
     blocks = [
-        LogEvent(each.begin_s, "the block in which it lifted off")
+        Event(EventKind.TAKEOFF, each.begin_s, "the block in which it lifted off")
         for each in log.blocks
         if ahead_s < each.begin_s <= stood_s < each.end_s
     ]
     begin = min(commands or blocks, key=lambda start: start.time_s, default=None)
-    return (LogEvent(stood_s, "lift-off"), False) if begin is None else (begin, True)
+    return (Event(EventKind.LIFT_OFF, stood_s, "lift-off"), False) if begin is None else (begin, True)
 
 
 def _kept(
-    log: FlightLog, time_s: Samples, begin: LogEvent, held: "_GainsAt", stood: int, down: int
-) -> tuple[slice, LogEvent]:
+    log: Recording, time_s: Samples, begin: Event, held: "_GainsAt", stood: int, down: int
+) -> tuple[slice, Event]:
     """The samples of the record, and the event that ends it; without a description for the landing or the log's end.
 
     Commands end a flight only in the air: a mode reported by a heartbeat may be a second old.
     """
     off_s = max(begin.time_s, float(time_s[stood]))
-    ends = [moment for moment in log.ends if moment.time_s > off_s]
+    ends = [moment for moment in log.events_of(*_ENDS) if moment.time_s > off_s]
     changes = [moment for moment in held.changes if moment.time_s > begin.time_s]
-    too_long = LogEvent(begin.time_s + LONGEST_S, "the longest record that is kept")
-    landing = LogEvent(float(time_s[down]), "")
+    too_long = Event(EventKind.END, begin.time_s + LONGEST_S, "the longest record that is kept")
+    landing = Event(EventKind.LANDING, float(time_s[down]), "")
     end = min((*ends, *changes, landing, too_long), key=lambda moment: moment.time_s)
     first, past = _between(time_s, begin.time_s - _BEFORE_S, end.time_s)
     return slice(first, min(past, first + MAX_SAMPLES)), end
@@ -310,7 +244,7 @@ def _ground_m(time_s: Samples, altitude_m: Samples, begin_s: float, stood: int) 
 class _GainsAt:
     """The gains that the vehicle used at a time, and their later changes."""
 
-    def __init__(self, log: FlightLog, at_s: float) -> None:
+    def __init__(self, log: Recording, at_s: float) -> None:
         known = {setting.name for setting in log.settings}
         logged = next((gains for gains in log.gain_sets if known.issuperset(gain.name for gain in gains)), ())
         names = [gain.name for gain in logged]
@@ -325,7 +259,11 @@ class _GainsAt:
         is_known = not any(map(np.isnan, gains.values()))
         self.gains: Gains = {gain.gain: gain.value(gains[gain.name]) for gain in logged if is_known}
         self.changes = [
-            LogEvent(each.time_s, f"{each.name} becoming {'unknown' if np.isnan(each.value) else f'{each.value:g}'}")
+            Event(
+                EventKind.PARAMETER,
+                each.time_s,
+                f"{each.name} becoming {'unknown' if np.isnan(each.value) else f'{each.value:g}'}",
+            )
             for each in settings
             if is_known and each.time_s > at_s and each.value != gains[each.name]
         ]
@@ -335,9 +273,9 @@ class _GainsAt:
 class _Record:
     """Data from which one takeoff is assembled."""
 
-    log: FlightLog
-    begin: LogEvent
-    end: LogEvent
+    log: Recording
+    begin: Event
+    end: Event
     is_commanded: bool
     ground_m: float
     held: _GainsAt
@@ -346,7 +284,7 @@ class _Record:
         ground_m = self.ground_m if self.log.from_ground else 0.0
         cut = {name: values[kept] - (ground_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
         complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
-        notes = (*self.log.notes, *self._notes([name for name in cut if name not in complete]))
+        notes = (*self.log.notes, *self.log.remarks, *self._notes([name for name in cut if name not in complete]))
         return Takeoff(
             number=number,
             start_s=self.begin.time_s - float(time_s[0]),
