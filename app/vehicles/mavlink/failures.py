@@ -271,6 +271,10 @@ class Limits:
         """Whether a pilot flies the vehicle in this mode. A mode that is not known is a pilot's."""
         return bool(mode and self.automatic_modes) and mode not in self.automatic_modes
 
+    def named(self, mode: str) -> str:
+        """Return the display name of a mode."""
+        return self.mode_names.get(mode, mode)
+
     def stretched(self, factor: float) -> "Limits":
         """Return the limits with all timeouts for packets multiplied by this factor."""
         return replace(

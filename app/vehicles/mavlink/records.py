@@ -223,6 +223,6 @@ def reason_of(trial: Trial) -> str:
         reason = trial.why
     else:
         reason = f"{RESPONSES[trial.failure].text} {trial.why}"
-    dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
+    dropped = trial.watch.positions.glitches if trial.failure is not Failure.GLITCHES else 0
     flag = f"{count(dropped, 'sample')} jumped and {'was' if dropped == 1 else 'were'} dropped." if dropped else ""
     return " ".join(part for part in (reason, flag) if part)

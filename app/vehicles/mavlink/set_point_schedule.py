@@ -71,7 +71,7 @@ def note_target(trial: Trial, measurement: Measurement | None, now_s: float) -> 
         case TargetAltitude(altitude_m=altitude_m):
             is_known = trial.plan.holds_first and trial.changes and not trial.changes_set_point
             is_astray = is_known and abs(altitude_m - wanted_m) > _SAME_M
-            return watching.with_changes(trial, astray_since_s=(since_s or now_s) if is_astray else None)
+            return replace(trial, astray_since_s=(since_s or now_s) if is_astray else None)
         case Heartbeat(mode=mode) if since_s is not None and now_s - since_s >= _ASTRAY_S:
             why = "Its set point was changed by a command that was not Gainline's."
             follows = mode in trial.plan.following_modes
@@ -169,7 +169,7 @@ def confirm(trial: Trial, done: ActionDone) -> Trial:
 def _climbs(trial: Trial) -> bool:
     """Whether the vehicle has not yet entered the mode in which it hovers after the climb, if there is one."""
     limits = trial.plan.limits
-    return bool(limits.hovering_modes) and watching.mode_of(trial.watch, limits) not in limits.hovering_modes
+    return bool(limits.hovering_modes) and trial.watch.modes.agreed(limits) not in limits.hovering_modes
 
 
 def _first_step_s(trial: Trial) -> float | None:
@@ -195,5 +195,5 @@ def _time_s(trial: Trial, number: int) -> float | None:
 
 def _elapsed_s(trial: Trial, now_s: float) -> float:
     """Vehicle's time since the takeoff command, at a time of the ground's clock."""
-    offset_s, start_s = trial.watch.least_offset_s, trial.commanded_boot_s
+    offset_s, start_s = trial.watch.clock.least_offset_s, trial.commanded_boot_s
     return float("-inf") if offset_s is None or start_s is None else now_s - offset_s - start_s

@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 
 from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     AbortRequested,
     Action,
@@ -125,7 +124,7 @@ class TrialRunner:
         trial, now_s = self._trial, self._radio.clock.now_s()
         if trial.state not in LANDING or now_s - self._sank_s < NOT_DESCENDING_AFTER_S:
             return ""
-        return NOT_DESCENDING if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m) else ""
+        return NOT_DESCENDING if trial.watch.positions.is_airborne(now_s, trial.plan.ground_m) else ""
 
     def _note_sinking(self) -> None:
         """Note since when the vehicle has not descended by `SINKS_M`."""

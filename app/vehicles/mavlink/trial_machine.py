@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from app.vehicles.mavlink import limit_checks, set_point_schedule
 from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
     AbortRequested,
     Action,
@@ -35,6 +35,7 @@ from app.vehicles.mavlink.events import (
     confirms_motors_off,
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, Finding, land_every_s
+from app.vehicles.mavlink.monitors.positions import DRIFT_M
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_reactions import (
@@ -105,7 +106,7 @@ def advance(trial: Trial, event: Event) -> Step:
         sample = dataclasses.replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
         trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
-        trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))
+        trial = replace(trial, watch=watching.note_duplicate(trial.watch, event.why))
     settled = watching.settle(
         trial.watch, event.now_s, trial.plan.ground_m, trial.plan.limits, commanded=trial.commanded_s is not None
     )
@@ -120,10 +121,10 @@ def advance(trial: Trial, event: Event) -> Step:
 def _poll_settings(trial: Trial, now_s: float) -> Step:
     """Request the mode of a vehicle whose heartbeats do not distinguish all modes, and settings in doubt."""
     mode = trial.plan.mode_parameter
-    names = sorted(trial.suspects | (set() if mode is None else {mode.name}))
+    names = trial.suspects if mode is None else trial.suspects | {mode.name}
     if not names or trial.state not in _STATES_WITH_TRIAL_GAINS or now_s - trial.polled_s < REPEAT_S:
         return trial, ()
-    return replace(trial, polled_s=now_s), tuple(RequestGain(name) for name in names)
+    return replace(trial, polled_s=now_s), tuple(RequestGain(name) for name in sorted(names))
 
 
 def _confirm_take_off(trial: Trial, event: Event) -> Step:
@@ -141,7 +142,7 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
     trial = _with_disarmed_height(trial, watch, event.now_s)
     trial, requests = _check_settings(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
-    if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
+    if trial.armed_s is None or trial.state not in _RECORDED or watch.identity.rebooted:
         return trial, requests
     if trial.state is State.ARM:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
@@ -149,8 +150,7 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
         trial = set_point_schedule.note_settling(trial, positions)
         trial = set_point_schedule.note_target(trial, event.measurement, event.now_s)
     to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
-    second_m = watch.second.altitude_m if watch.second is not None else None
-    samples = (RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
+    samples = (RecordSample(each, to_m, watch.battery.voltage_v, watch.second.altitude_m) for each in positions)
     return trial, (*requests, *samples)
 
 
@@ -168,7 +168,7 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
     if name not in trial.suspects:
         return replace(trial, suspects=trial.suspects | {name}), (RequestGain(name),)
     if mode is not None and name == mode.name:
-        entered = limit_checks.named(mode.modes[value], trial.plan.limits)
+        entered = trial.plan.limits.named(mode.modes[value])
         return note(trial, Finding(failure=Failure.UNEXPECTED, why=f"The vehicle entered mode {entered}.")), ()
     why = f"{name} changed to {value:g} by a command that was not Gainline's."
     return note(trial, Finding(failure=Failure.INTERRUPTED, why=why)), ()
@@ -176,19 +176,19 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
 
 def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -> Trial:
     """Note the height of a vehicle in the air whose heartbeats begin to report that its motors are off."""
-    if watch.armed == trial.watch.armed or trial.state not in _FLOWN:
+    if watch.modes.armed is trial.watch.modes.armed or trial.state not in _FLOWN:
         return trial
-    ground_m, last = trial.plan.ground_m, watch.last
-    is_up = last is not None and watching.is_fresh(watch, now_s) and not watching.reports_landing(watch, now_s)
-    height_m = last.altitude_m - ground_m if last is not None and is_up and not watch.armed else 0.0
-    return replace(trial, disarmed_m=height_m)
+    is_up = watch.positions.is_fresh(now_s) and not watch.ground.reports_landing(now_s)
+    height_m = watch.positions.height_m(trial.plan.ground_m) if is_up and not watch.modes.armed else None
+    return replace(trial, disarmed_m=height_m or 0.0)
 
 
 def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
     """Note a manual mode that only one heartbeat reported."""
-    if trial.state not in _STATES_WITH_TRIAL_GAINS or not _modes(trial):
+    is_unchanged = watch.modes is trial.watch.modes
+    if is_unchanged or trial.state not in _STATES_WITH_TRIAL_GAINS or not _modes(trial):
         return trial
-    finding = limit_checks.find_interruption(trial.watch, watch, trial.plan.limits)
+    finding = watch.modes.find_interruption(trial.watch.modes, trial.plan.limits)
     return trial if finding is None else note(trial, finding)
 
 
@@ -196,18 +196,18 @@ def _with_fall(trial: Trial, now_s: float) -> Trial:
     """Note a fall in any state, unless a person has requested motors off."""
     if trial.stopped or trial.commanded_s is None or trial.fell_s is not None:
         return trial
-    fall = limit_checks.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
+    fall = trial.watch.positions.find_fall(trial.plan.limits, trial.plan.ground_m)
     return trial if fall is None else replace(note(trial, fall), contact="fell", fell_s=now_s)
 
 
 def _with_disarming(trial: Trial) -> Trial:
     """Note that somebody else, or the vehicle itself, stopped its motors in the air: it exceeded its limits because it
     fell."""
-    watch, limits = trial.watch, trial.plan.limits
-    if trial.stopped or trial.state not in _UNTIL_STOPPED or not watching.is_disarmed(watch, limits):
+    modes = trial.watch.modes
+    if trial.stopped or trial.state not in _UNTIL_STOPPED or not modes.is_disarmed(trial.plan.limits):
         return trial
-    fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
-    if not fell and trial.disarmed_m <= watching.DRIFT_M:
+    fell = trial.fell_s is not None and modes.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
+    if not fell and trial.disarmed_m <= DRIFT_M:
         return trial
     return note_cause(trial, Finding(failure=Failure.UNEXPECTED, why="Its motors were stopped in the air."))
 
@@ -218,22 +218,22 @@ def _with_drift(trial: Trial, now_s: float) -> Trial:
     is_up = trial.commanded_s is not None and trial.state in _UNTIL_STOPPED
     if trial.stopped or not is_up or trial.fell_s is not None:
         return trial
-    plan, landed_blocks = trial.plan, trial.plan.limits.landed_blocks
+    watch, plan = trial.watch, trial.plan
     is_told_to_land = trial.state not in _STATES_WITH_TRIAL_GAINS
-    has_landed = is_told_to_land and watching.has_reported_landing(trial.watch, now_s, landed_blocks)
-    drift = limit_checks.find_drift(trial.watch, now_s, plan.ground_m, has_landed=has_landed)
+    has_landed = is_told_to_land and watching.has_reported_landing(watch, now_s, plan.limits)
+    drift = watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed)
     trial = trial if drift is None else note_cause(trial, drift)
-    contradiction = limit_checks.find_contradiction(trial.watch, now_s)
+    contradiction = watch.ground.find_contradiction(now_s)
     return trial if contradiction is None else note(trial, contradiction)
 
 
 def _with_jump(trial: Trial) -> Trial:
     """Note in any state a jump after which the vehicle's identity is uncertain. An earlier failure of its limits may
     have been one of false positions."""
-    if trial.commanded_s is None or trial.doubt or trial.watch.jumped_m <= _OTHER_M:
+    if trial.commanded_s is None or trial.doubt or trial.watch.positions.jumped_m <= _OTHER_M:
         return trial
     failure = Failure.LOST_POSITION if trial.failure is Failure.ENVELOPE else trial.failure
-    return replace(trial, failure=failure, doubt=f"Its altitude jumped by {trial.watch.jumped_m:.1f} m.")
+    return replace(trial, failure=failure, doubt=f"Its altitude jumped by {trial.watch.positions.jumped_m:.1f} m.")
 
 
 def _react(trial: Trial, event: Event) -> Step:
@@ -249,27 +249,28 @@ def _arm(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if isinstance(event, ActionDone) and event.action is Action.ARM:
         trial = replace(trial, arm_sent_s=now_s)
-    if trial.watch.armed and trial.armed_s is None:
+    if trial.watch.modes.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
         return fail(measure_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
     if finding := _noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED):
         return fail(measure_ground(trial, now_s), finding, now_s)
-    if finding := limit_checks.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
+    if finding := watching.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
-    if trial.armed_s is None or not trial.watch.armed or now_s - trial.armed_s < BASELINE_S or last is None:
+    if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    watch = replace(trial.watch, behind_m=0.0, stepped_s=0.0, highest_m=last.altitude_m)
-    trial = measure_ground(replace(trial, watch=watch), now_s)
+    trial = measure_ground(replace(trial, watch=watching.begin_climb(trial.watch, last.altitude_m)), now_s)
+    watch, plan = trial.watch, trial.plan
+    stands = watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)
     if finding := (
-        limit_checks.find_departure(trial.watch, trial.plan.limits, trial.plan.ground_m, now_s)
-        or limit_checks.find_disagreement_on_ground(trial.watch, trial.ground_shift_m, now_s)
+        watch.positions.find_departure(plan.ground_m, stands=stands)
+        or watch.second.find_disagreement_on_ground(last.altitude_m, trial.ground_shift_m, now_s)
         or _unconfirmed_setting(trial)
     ):
         return fail(trial, finding, now_s)
-    mode, watch = trial.watch.mode, replace(trial.watch, block="", mode_since_s=now_s + _MODE_KNOWN_S)
-    boot_s = _boot_s(trial.watch, last, now_s)
+    mode, modes = watch.modes.mode, replace(watch.modes, block="", mode_since_s=now_s + _MODE_KNOWN_S)
+    watch, boot_s = replace(watch, modes=modes), _boot_s(watch, last, now_s)
     trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=boot_s, commanded_in=mode)
     trial, request = request_reply(enter(trial, State.TAKEOFF, now_s), now_s)
     return trial, (PerformAction(Action.TAKE_OFF), *request)
@@ -285,13 +286,13 @@ def _unconfirmed_setting(trial: Trial) -> Finding | None:
 def _boot_s(watch: TrialObservation, last: Position, now_s: float) -> float:
     """Return the vehicle's own time of the takeoff command: that of its last sample, or later if that one had waited
     through a stall of this program."""
-    offset_s = watch.least_offset_s
+    offset_s = watch.clock.least_offset_s
     return last.time_boot_s if offset_s is None else max(last.time_boot_s, now_s - offset_s - _WAITED_S)
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
     why = ""
-    if trial.armed_s is not None and watching.is_disarmed(trial.watch, trial.plan.limits):
+    if trial.armed_s is not None and trial.watch.modes.is_disarmed(trial.plan.limits):
         why = "It disarmed itself."
     elif trial.armed_s is None:
         late = trial.arm_sent_s is not None and event.now_s - trial.arm_sent_s > ARMED_WITHIN_S
@@ -303,9 +304,9 @@ def _take_off(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if finding := _finding(trial, now_s):
         return fail(trial, finding, now_s)
-    if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
+    if trial.watch.positions.is_airborne(now_s, trial.plan.ground_m):
         return enter(trial, State.RECORD, now_s), ()
-    if finding := limit_checks.find_altitude_behind(trial.watch):
+    if finding := trial.watch.climb.find_behind():
         return fail(trial, finding, now_s)
     if isinstance(event, ActionRefused):
         refused = replace(trial, confirmed_boot_s=trial.commanded_boot_s)
@@ -317,8 +318,8 @@ def _take_off(trial: Trial, event: Event) -> Step:
 
 def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
     watch, is_late = trial.watch, _waited_s(trial) > trial.plan.lift_off_s
-    decides_soon = not watch.armed or watch.unchanged_s > _STUCK_S
-    if not is_late or decides_soon or not watching.is_fresh(watch, now_s):
+    decides_soon = not watch.modes.armed or watch.positions.unchanged_s > _STUCK_S
+    if not is_late or decides_soon or not watch.positions.is_fresh(now_s):
         return None
     if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
         why = "It reports that it flies, but its altitude stayed on the ground."
@@ -339,7 +340,7 @@ def _record(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
     if _has_rested(trial, DOWN_S, now_s) and _is_armed_since(trial, trial.resting_since_s):
-        stayed = watching.may_have_stayed(trial.watch, trial.plan.ground_m, trial.commanded_s or now_s)
+        stayed = _may_have_stayed(trial, now_s)
         descended = Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself.")
         if finding := _no_lift_off(trial, now_s) if stayed else descended:
             return fail(trial, finding, now_s)
@@ -349,16 +350,23 @@ def _record(trial: Trial, event: Event) -> Step:
         return _overtime(trial, now_s)
     if finding := set_point_schedule.find_missing(trial):
         return fail(trial, finding, now_s)
-    if watching.too_many_glitches(trial.watch):
-        trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
-    lowest_m = min(trial.plan.set_points.altitudes_m) + trial.plan.datum_m
-    sunken = limit_checks.find_sunken(trial.watch, lowest_m, trial.plan.ground_m)
-    if finding := _unconfirmed_setting(trial) or sunken:
-        trial = note(trial, finding)
-    incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.climb_to_m)
-    if trial.plan.climbs_from_ground and incomplete:
-        trial = note(trial, incomplete)
+    plan, watch = trial.plan, trial.watch
+    lowest_m = min(plan.set_points.altitudes_m) + plan.datum_m
+    for finding in (
+        watch.positions.find_glitches(),
+        _unconfirmed_setting(trial) or watch.climb.find_sunken(watch.last, lowest_m, plan.ground_m),
+        watch.climb.find_incomplete(plan.climb_to_m) if plan.climbs_from_ground else None,
+    ):
+        trial = trial if finding is None else note(trial, finding)
     return land(trial, State.LAND, now_s)
+
+
+def _may_have_stayed(trial: Trial, now_s: float) -> bool:
+    """Whether its landed state has always been that it stands since the command, and its altitude has not been higher
+    than one may shift as the motors start."""
+    watch = trial.watch
+    stood = watch.ground.has_stood_since(trial.commanded_s or now_s)
+    return stood and watch.climb.highest_m - trial.plan.ground_m <= DRIFT_M
 
 
 def _withdraw(trial: Trial, now_s: float) -> Step:
@@ -451,18 +459,18 @@ def _is_land_due(trial: Trial, now_s: float) -> bool:
 
 def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
     """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
-    return _is_by_hand(trial) and now_s - trial.watch.heartbeat_s < trial.plan.limits.confirmation_s
+    return _is_by_hand(trial) and now_s - trial.watch.modes.heartbeat_s < trial.plan.limits.confirmation_s
 
 
 def _is_by_hand(trial: Trial) -> bool:
     """Whether the newest heartbeat shows a manual mode."""
-    watch = trial.watch
-    return bool(_modes(trial)) and watch.armed and trial.plan.limits.is_manual(watch.mode)
+    modes = trial.watch.modes
+    return modes.armed and trial.plan.limits.is_manual(modes.mode) and bool(_modes(trial))
 
 
 def _doubting(trial: Trial) -> Trial:
     """Note a finding that makes the vehicle's state uncertain while it lands for another reason."""
-    finding = _changed(trial) if trial.commanded_s is not None else limit_checks.find_duplicate(trial.watch)
+    finding = _changed(trial) if trial.commanded_s is not None else trial.watch.identity.find_duplicate()
     return trial if finding is None else note(trial, finding)
 
 
@@ -471,8 +479,8 @@ def _come_down(trial: Trial, now_s: float) -> Step:
     may have fallen."""
     if trial.failure is not Failure.FALL and _changed(trial):
         return quarantine(trial, "", now_s)
-    unseen_m = trial.plan.ground_m if trial.watch.unseen_m is None else trial.watch.unseen_m
-    if unseen_m - trial.plan.ground_m > watching.DRIFT_M and not trial.doubt:
+    ground_m, unseen_m = trial.plan.ground_m, trial.watch.climb.unseen_m
+    if unseen_m is not None and unseen_m - ground_m > DRIFT_M and not trial.doubt:
         trial = replace(trial, doubt="Its landing was not observed: it may have fallen.")
     return disarm(trial, now_s)
 
@@ -480,14 +488,15 @@ def _come_down(trial: Trial, now_s: float) -> Step:
 def _resting(trial: Trial, now_s: float) -> Trial:
     """Note since when it has been at rest: on the ground by every source, or, once its motors are off, near the ground
     by speed alone, because the altitude of some autopilots drifts. A single sample that jumps is ignored."""
-    if trial.watch.doubted is not None and watching.is_fresh(trial.watch, now_s):
+    if trial.watch.positions.is_in_doubt(now_s):
         return trial
-    if not watching.is_disarmed(trial.watch, trial.plan.limits):
-        rests = trial.watch.grounded_since_s is not None
+    if not trial.watch.modes.is_disarmed(trial.plan.limits):
+        rests = trial.watch.ground.grounded_since_s is not None
     else:
-        rests = watching.is_still(trial.watch, now_s, trial.plan.ground_m)
-    since_s = trial.resting_since_s if trial.resting_since_s is not None else now_s
-    return watching.with_changes(trial, resting_since_s=since_s if rests else None)
+        rests = trial.watch.positions.is_still(now_s, trial.plan.ground_m)
+    if rests is (trial.resting_since_s is not None):
+        return trial
+    return replace(trial, resting_since_s=now_s if rests else None)
 
 
 def _has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
@@ -496,14 +505,15 @@ def _has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
 
 def _is_armed_since(trial: Trial, since_s: float | None) -> bool:
     """Whether a heartbeat since then has reported that its motors run: nobody else has stopped them."""
-    return trial.watch.armed and since_s is not None and trial.watch.heartbeat_s >= since_s
+    modes = trial.watch.modes
+    return modes.armed and since_s is not None and modes.heartbeat_s >= since_s
 
 
 def _has_landed(trial: Trial, now_s: float) -> bool:
     """Whether it has been at rest for 2 s, or has disarmed itself near the ground, as some do, by a fresh position."""
-    is_high = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-    near = watching.is_fresh(trial.watch, now_s) and not is_high
-    disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
+    positions = trial.watch.positions
+    near = positions.is_fresh(now_s) and not positions.is_airborne(now_s, trial.plan.ground_m)
+    disarmed = trial.watch.modes.is_disarmed(trial.plan.limits)
     return (_has_rested(trial, LANDED_S, now_s) and not find_doubt_of_descent(trial, now_s)) or (near and disarmed)
 
 
@@ -531,7 +541,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     watch, plan = trial.watch, trial.plan
     stands = trial.commanded_s is None and watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)
-    airborne = watch.armed and watching.is_airborne(watch, now_s, plan.ground_m)
+    airborne = watch.modes.armed and watch.positions.is_airborne(now_s, plan.ground_m)
     if airborne and not (stands or trial.stopped):
         why = "It was in the air when its motors were to be stopped."
         return abort(replace(trial, doubt=trial.doubt or why), now_s)
@@ -566,9 +576,9 @@ def _is_stopped(trial: Trial, event: Event) -> bool:
     if not isinstance(event, PacketReceived) or not isinstance(event.measurement, Heartbeat) or event.measurement.armed:
         return False
     if trial.commanded_s is None:  # a heartbeat may have been under way since before it armed
-        since_s = max(trial.watch.armed_since_s, trial.since_s)
+        since_s = max(trial.watch.modes.armed_since_s, trial.since_s)
         return event.now_s - since_s >= trial.plan.limits.confirmation_s
-    return trial.answered or watching.is_disarmed(trial.watch, trial.plan.limits)
+    return trial.answered or trial.watch.modes.is_disarmed(trial.plan.limits)
 
 
 def _restoring(trial: Trial, event: Event) -> Step:
@@ -599,21 +609,24 @@ _RECORDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.ABOR
 
 def _finding(trial: Trial, now_s: float) -> Finding | None:
     """Return the most severe failure between the command and the end of the record, if any."""
-    plan, watch = trial.plan, trial.watch
+    plan, watch, modes = trial.plan, trial.watch, _modes(trial)
+    has_climbed = watch.climb.has_been_near(plan.climb_to_m)
     return (
-        _taken_over(trial)
-        or limit_checks.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
+        (watch.modes.find_taken_over(plan.limits) if modes else None)
+        or watch.identity.find_reboot()
+        or watch.modes.find_disarming(plan.limits)
+        or watch.modes.find_unexpected(plan.limits, modes, _blocks(trial))
         or _noted(trial, Failure.UNEXPECTED, Failure.LOST_POSITION)
-        or (limit_checks.find_interrupted_climb(watch, plan.limits, plan.climb_to_m) if _modes(trial) else None)
-        or limit_checks.find_duplicate(watch)
-        or limit_checks.find_link(watch, plan.limits, now_s)
-        or limit_checks.find_jump(watch)
-        or limit_checks.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
-        or limit_checks.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
-        or limit_checks.find_frozen(watch, plan.limits, now_s)
-        or limit_checks.find_lost_position(watch, plan.limits, now_s)
-        or limit_checks.find_disagreement(watch.second)
-        or limit_checks.find_battery(watch, now_s)
+        or (watch.modes.find_interrupted_climb(plan.limits, has_climbed=has_climbed) if modes else None)
+        or watch.identity.find_duplicate()
+        or watching.find_link(watch, plan.limits, now_s)
+        or watch.positions.find_jump()
+        or watch.envelope.find(plan.limits, watch.last, plan.ground_m, settling=True)
+        or watch.modes.find_own_landing(plan.limits, watch.positions.height_m(plan.ground_m), mode_known=bool(modes))
+        or watching.find_frozen(watch, plan.limits, now_s)
+        or watching.find_lost_position(watch, plan.limits, now_s)
+        or watch.second.find_disagreement()
+        or watch.battery.find(now_s)
     )
 
 
@@ -623,36 +636,39 @@ def _noted(trial: Trial, *failures: Failure) -> Finding | None:
 
 
 def _envelope(trial: Trial) -> Finding | None:
-    return limit_checks.find_envelope(trial.watch, trial.plan.limits, ground_m=trial.plan.ground_m, settling=False)
+    return trial.watch.envelope.find(trial.plan.limits, trial.watch.last, trial.plan.ground_m, settling=False)
 
 
 def _taken_over(trial: Trial) -> Finding | None:
     """Whether a pilot has taken over, by heartbeats sent certainly after the command."""
-    return limit_checks.find_taken_over(trial.watch, trial.plan.limits) if _modes(trial) else None
+    finding = trial.watch.modes.find_taken_over(trial.plan.limits)
+    return finding if finding is not None and _modes(trial) else None
 
 
 def _changed(trial: Trial) -> Finding | None:
     """Return an unexpected change of state during a landing, in which disarming is expected."""
-    watch = watching.with_changes(trial.watch, armed=True)
-    return limit_checks.find_duplicate(watch) or limit_checks.find_unexpected(
-        watch, trial.plan.limits, _modes(trial), _blocks(trial)
+    watch = trial.watch
+    return (
+        watch.identity.find_duplicate()
+        or watch.identity.find_reboot()
+        or watch.modes.find_unexpected(trial.plan.limits, _modes(trial), _blocks(trial))
     )
 
 
 def _modes(trial: Trial) -> frozenset[str]:
     """Return the modes that the vehicle may be in. Any (empty) until a heartbeat sent certainly after the command, and
     while the vehicle stays in its previous mode, because it has not executed the command then."""
-    limits, watch = trial.plan.limits, trial.watch
+    seen, limits = trial.watch.modes, trial.plan.limits
     if trial.commanded_s is not None:
         command_s = trial.commanded_s
-        has_stayed = not watch.lifted and watch.mode_since_s <= command_s + _MODE_KNOWN_S
-        has_stayed = has_stayed and watch.mode == trial.commanded_in
+        has_stayed = not trial.watch.climb.lifted and seen.mode_since_s <= command_s + _MODE_KNOWN_S
+        has_stayed = has_stayed and seen.mode == trial.commanded_in
     elif trial.state is State.ABORT_LAND:
         command_s = trial.since_s
-        has_stayed = watch.mode_since_s <= command_s
+        has_stayed = seen.mode_since_s <= command_s
     else:
         return frozenset()
-    if has_stayed or watch.heartbeat_s - command_s < _MODE_KNOWN_S:
+    if has_stayed or seen.heartbeat_s - command_s < _MODE_KNOWN_S:
         return frozenset()
     return _flying_modes(trial) | limits.landing_modes
 
@@ -673,18 +689,18 @@ def _blocks(trial: Trial) -> frozenset[str]:
     and some plans return to them after the landing."""
     limits = trial.plan.limits
     allowed = limits.flying_blocks | limits.landing_blocks
-    early = trial.commanded_s is None or trial.watch.block_s - trial.commanded_s < _MODE_KNOWN_S
+    early = trial.commanded_s is None or trial.watch.modes.block_s - trial.commanded_s < _MODE_KNOWN_S
     return allowed | limits.arming_blocks if early or trial.state not in _STATES_WITH_TRIAL_GAINS else allowed
 
 
 def _confirms_landing(trial: Trial, now_s: float) -> bool:
     """Whether telemetry confirms that the vehicle is landing: it descends, or is near the ground."""
-    last = trial.watch.last
-    if last is None or not watching.is_fresh(trial.watch, now_s):
+    positions, modes, limits = trial.watch.positions, trial.watch.modes, trial.plan.limits
+    last = positions.last
+    if last is None or not positions.is_fresh(now_s):
         return False
-    limits = trial.plan.limits
-    is_new = now_s - trial.watch.block_s < _LANDING_BLOCK_S
-    lands = is_new and trial.watch.block in limits.landing_blocks  # another Land would begin its landing again
-    lands = lands or watching.mode_of(trial.watch, limits) in limits.landing_modes - limits.flying_modes
-    near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    is_new = now_s - modes.block_s < _LANDING_BLOCK_S
+    lands = is_new and modes.block in limits.landing_blocks  # another Land would begin its landing again
+    lands = lands or modes.agreed(limits) in limits.landing_modes - limits.flying_modes
+    near = not positions.is_airborne(now_s, trial.plan.ground_m)
     return (near and (lands or not find_doubt_of_descent(trial, now_s))) or last.climb_rate_m_s < DESCENDING_M_S

@@ -257,7 +257,7 @@ class Trial:
     def may_take_off(self) -> bool:
         """Whether the takeoff command may yet reach the vehicle, which has not been seen in the air: its position may
         be of the time before, and a command to stop its motors would arrive after it."""
-        return self.commanded_s is not None and self.confirmed_boot_s is None and not self.watch.lifted
+        return self.commanded_s is not None and self.confirmed_boot_s is None and not self.watch.climb.lifted
 
     @property
     def outcome(self) -> Outcome | None:
@@ -272,7 +272,7 @@ class Trial:
     @property
     def has_confirmed_stop(self) -> bool:
         """Whether a vehicle whose motors a person has stopped reports it, in its newest heartbeat and by a reply."""
-        return self.stopped and self.answered and not self.watch.armed
+        return self.stopped and self.answered and not self.watch.modes.armed
 
 
 def measure_ground(trial: Trial, now_s: float) -> Trial:
@@ -280,11 +280,11 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
     and is reset by an autopilot that counts from the ground. If it may have moved, the ground is unchanged."""
     watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
     stood = samples[len(samples) // 2 :]
-    if not stood or watch.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
+    if not stood or watch.positions.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
         return trial
     altitudes_m = [position.altitude_m for position in stood]
     is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
-    is_in_place = stood[-1].away_m(watch.origin or stood[-1]) <= _IN_PLACE_M
+    is_in_place = stood[-1].away_m(watch.envelope.origin or stood[-1]) <= _IN_PLACE_M
     shift_m = statistics.median(altitudes_m) - plan.ground_m
     may_shift = plan.climbs_from_ground or abs(shift_m) <= _SHIFT_M
     if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
@@ -331,7 +331,7 @@ def _give_up_take_off(trial: Trial, now_s: float) -> Step:
     """Stop the motors of a vehicle that has received the command and is on the ground by every source; otherwise abort,
     because it may yet lift off, or has, with its integrator wound up. One that reports its landing by a block of its
     flight plan always lands."""
-    stands = trial.watch.grounded_since_s is not None and not find_doubt_of_descent(trial, now_s)
+    stands = trial.watch.ground.grounded_since_s is not None and not find_doubt_of_descent(trial, now_s)
     return disarm(trial, now_s) if stands else abort(trial, now_s)
 
 
@@ -396,10 +396,10 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
         return "it has not replied since the takeoff command, which may still be under way"
     if trial.commanded_s is None:
         return ""
-    if landed_blocks or watch.landed is not None:
-        has_landed = watch.block in landed_blocks if landed_blocks else watching.reports_landing(watch, now_s)
+    if landed_blocks or watch.ground.landed is not None:
+        has_landed = watch.modes.block in landed_blocks if landed_blocks else watch.ground.reports_landing(now_s)
         return "" if has_landed else "it has not reported a landing, and an altitude may drift"
-    return "" if watch.lifted and watch.unseen_m is None else "its descent was not observed"
+    return "" if watch.climb.lifted and watch.climb.unseen_m is None else "its descent was not observed"
 
 
 def request_reply(trial: Trial, now_s: float) -> Step:
@@ -430,10 +430,10 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     is_arming = trial.state is State.ARM and not watching.is_said_to_fly(watch, now_s, ground_m)
     if trial.commanded_s is None and (stands or is_arming):
         return ""
-    if watch.last is not None and watching.is_airborne(watch, now_s, ground_m):
-        height_m = watch.last.altitude_m - ground_m
+    if watch.positions.is_airborne(now_s, ground_m):
+        height_m = watch.positions.height_m(ground_m)
         return f"The vehicle was {height_m:.1f} m above the ground: inspect it before it flies again."
-    if watching.is_grounded(watch, now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
+    if watch.positions.is_grounded(now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
         return ""
     return "The vehicle was not known to be on the ground: inspect it before it flies again."
 
@@ -451,11 +451,12 @@ def _has_stayed_down(trial: Trial, now_s: float) -> bool:
     took the command may rise before any message shows it, and its altitude may stand still."""
     watch = trial.watch
     if trial.commanded_s is None:
-        return not watch.lifted
+        return not watch.climb.lifted
     if trial.failure is not Failure.TAKE_OFF_REFUSED:
         return False
-    stood = watch.grounded_since_s is not None and watch.grounded_since_s <= trial.commanded_s + _STANDS_S
-    return stood and not (trial.doubt or watch.glitches or find_doubt_of_ground(trial, now_s))
+    since_s = watch.ground.grounded_since_s
+    stood = since_s is not None and since_s <= trial.commanded_s + _STANDS_S
+    return stood and not (trial.doubt or watch.positions.glitches or find_doubt_of_ground(trial, now_s))
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:

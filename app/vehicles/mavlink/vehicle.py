@@ -25,7 +25,7 @@ from app.vehicles.base import (
     requested,
 )
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight, records
+from app.vehicles.mavlink import addresses, parameters, preflight, records
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
@@ -687,7 +687,7 @@ class MavlinkVehicle:
     def _keep_landing(self, trial: Trial) -> None:
         """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
         it."""
-        by_hand = limit_checks.find_taken_over(trial.watch, trial.plan.limits) is not None
+        by_hand = trial.watch.modes.find_taken_over(trial.plan.limits) is not None
         is_disarmed = self._radio.is_disarmed or trial.has_confirmed_stop
         if not by_hand and not is_disarmed and self._repeated is None:
             with suppress(LinkError):
@@ -749,7 +749,7 @@ class MavlinkVehicle:
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
         reason = records.reason_of(trial)
         if start_s is None and trial.failure is Failure.OPERATOR:
-            return self._not_begun(ground, reason, has_flown=trial.watch.lifted)
+            return self._not_begun(ground, reason, has_flown=trial.watch.climb.lifted)
         if start_s is None:
             refusal = VehicleError(reason, hint="Inspect the vehicle, correct this, then fly again.")
             refusal.not_flown = True

@@ -81,7 +81,7 @@ def hops(walk: TrialDriver) -> None:
     walk.climb_rate_m_s = 0.4
     walk.pass_s(0.2)
     walk.climb(-0.4, for_s=0.2)
-    assert not walk.trial.watch.lifted
+    assert not walk.trial.watch.climb.lifted
 
 
 def climbs_at_an_altitude_that_stands_still(walk: TrialDriver) -> None:
@@ -163,7 +163,7 @@ def test_a_vehicle_that_was_above_the_ground_before_the_takeoff_command_has_flow
     walk.climb_rate_m_s = 1.0
     walk = aborted(walk.pass_s(0.5))
     walk.climb_rate_m_s = 0.0
-    assert (walk.trial.commanded_s, walk.trial.watch.lifted) == (None, True)
+    assert (walk.trial.commanded_s, walk.trial.watch.climb.lifted) == (None, True)
     walk.touch_down()
     assert has_flown(walk.trial)
 

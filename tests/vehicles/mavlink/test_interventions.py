@@ -193,7 +193,7 @@ def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle
 def heartbeat_of_a_pilot(walk: TrialDriver) -> TrialDriver:
     """Until one heartbeat has told of a pilot's mode; the next one is not due yet."""
     walk.mode = "64"
-    while walk.trial.watch.mode != "64":
+    while walk.trial.watch.modes.mode != "64":
         walk.pass_s(STEP_S)
     return walk
 

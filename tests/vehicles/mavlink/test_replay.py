@@ -135,7 +135,7 @@ def test_a_recorded_trial_goes_through_its_states_without_any_failure(
         State.RESTORE,
         State.IDLE,
     ]
-    assert (flight.trial.failure, flight.trial.watch.glitches) == (None, 0)
+    assert (flight.trial.failure, flight.trial.watch.positions.glitches) == (None, 0)
     assert RestoreGains() in [command for _, command in flight.told]
 
 

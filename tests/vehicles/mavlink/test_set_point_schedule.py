@@ -150,7 +150,7 @@ def test_steps_that_overshoot_by_a_third_are_no_oscillation_and_further_crossing
         walk.until_s(due_s + 1.7)
         walk.wanted_m = to_m
     walk.until_s(14.0)
-    assert (walk.state, walk.trial.watch.crossings) == (State.RECORD, 0)
+    assert (walk.state, walk.trial.watch.envelope.crossings) == (State.RECORD, 0)
     walk.until_s(14.0)
     for number in range(6):
         walk.wanted_m = 2.0 + (-0.35 if number % 2 == 0 else 0.35)
@@ -383,7 +383,7 @@ def test_a_pilot_who_takes_over_while_it_is_commanded_to_hold_is_not_overridden(
 
 def test_holding_the_first_set_point_again_permits_no_crossing() -> None:
     walk = asked()
-    assert not walk.trial.watch.may_overshoot
+    assert not walk.trial.watch.envelope.may_overshoot
 
 
 def test_the_mode_in_which_it_follows_set_points_is_unexpected_before_the_first() -> None:

@@ -129,7 +129,7 @@ def test_the_ground_is_where_a_vehicle_stands_whose_altitude_began_anew_as_it_wa
     assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + by_m)
     assert walk.trial.plan.datum_m == walk.trial.plan.ground_m
     assert walk.trial.plan.limits.set_point_m == pytest.approx(PLAN.limits.set_point_m + by_m)
-    assert walk.trial.watch.crossings == 0
+    assert walk.trial.watch.envelope.crossings == 0
     walk.pass_s(1.0)
     assert walk.trial.failure is None, "it is not taken for one in the air"
     walk.climb_rate_m_s = 1.0

@@ -1,0 +1,5 @@
+"""Monitors of a trial: each is one small frozen state of what was heard, with its own update and its own findings.
+
+`observation` composes them. A monitor knows no other: what it needs of another one is an argument. Times are in s by
+the ground's clock, except inside a Position; altitudes in m on the vehicle's datum.
+"""
