@@ -14,7 +14,7 @@ from itertools import pairwise, product
 import pytest
 
 from app.vehicles.mavlink.records import ending_of, has_flown
-from app.vehicles.mavlink.trial_reactions import TRANSITIONS
+from app.vehicles.mavlink.trial_state import TRANSITIONS
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, judge
 from bench.hazards.hostile_table import HAZARDS
 from bench.hazards.rig import InjectedFault

@@ -124,7 +124,7 @@ def update(
         case Attitude(lean_rad=lean_rad):
             watch = replace(watch, envelope=watch.envelope.add_attitude(lean_rad, now_s))
         case Heartbeat():
-            watch = replace(watch, modes=watch.modes.update(measurement, now_s))
+            watch = replace(watch, modes=watch.modes.update(measurement, now_s, limits))
         case Battery(voltage_v=float(volts)):
             watch = replace(watch, battery=watch.battery.update(volts, now_s, limits))
         case FenceBreach(limit=limit):
@@ -241,15 +241,11 @@ def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Fin
         watch.identity.find_reboot()
         or watch.envelope.find_oscillation()
         or watch.identity.find_duplicate()
-        or find_link(watch, limits, now_s)
+        or watch.link.find(limits, watch.modes.heartbeat_s, now_s)
         or find_frozen(watch, limits, now_s)
         or find_lost_position(watch, limits, now_s)
         or watch.battery.find(now_s)
     )
-
-
-def find_link(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    return watch.link.find(limits, watch.modes.heartbeat_s, now_s)
 
 
 def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
@@ -261,7 +257,7 @@ def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Findin
 
 
 def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    """Find a lost position; to be called after `find_link`, because silence is a lost link."""
+    """Find a lost position; to be called after a lost link was looked for, because silence is one."""
     return (
         watch.positions.find_implausible(limits, watch.link.received_s, now_s)
         or watch.clock.find_late(limits)

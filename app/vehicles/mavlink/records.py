@@ -18,7 +18,7 @@ from app.core.records.trajectory import Samples, Trajectory
 from app.vehicles.base import LANDED, Ending, OptionValue
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.trial_machine import Trial
+from app.vehicles.mavlink.trial_state import Trial
 
 Scored = Literal["vehicle", "mocap"]
 """Source of the scored altitude."""

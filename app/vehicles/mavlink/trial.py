@@ -34,8 +34,8 @@ from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.profiles.base import Outgoing, Target
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
-from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_reactions import LANDING, State
+from app.vehicles.mavlink.trial_machine import advance, begin
+from app.vehicles.mavlink.trial_state import LANDING, Plan, State, Trial
 
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""
@@ -272,7 +272,7 @@ class TrialRunner:
             source = self._radio.profile.reference
             return self._loop.reference_at(source, position.altitude_m, now_s)
         time_s = np.array([position.time_boot_s - trial.commanded_boot_s])
-        flown = at_last_times(trial.plan.takeoff, trial.changes)
+        flown = at_last_times(trial.plan.takeoff, trial.set_points.changes)
         return float(self._reference(flown, time_s)[0]) + trial.plan.datum_m
 
     def _restored(self) -> str:

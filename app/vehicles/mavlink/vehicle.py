@@ -41,8 +41,7 @@ from app.vehicles.mavlink.repeated_command import STOPPING_S, RepeatedCommand
 from app.vehicles.mavlink.set_point_schedule import referred_from_s, with_hold
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
-from app.vehicles.mavlink.trial_machine import Plan, Trial
-from app.vehicles.mavlink.trial_reactions import QUARANTINE_STATES, TRANSITIONS, State
+from app.vehicles.mavlink.trial_state import QUARANTINE_STATES, TRANSITIONS, Plan, State, Trial
 
 STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""
@@ -758,7 +757,7 @@ class MavlinkVehicle:
         own = with_flown_set_points(
             records.trajectory_of(flown.samples, start_s, plan.datum_m, referred_from_s=referred_from_s(plan)),
             plan.takeoff,
-            trial.changes,
+            trial.set_points.changes,
             ground_m=plan.ground_m - plan.datum_m,
             reference=flown.reference,
         )

@@ -15,7 +15,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import contact_of, has_flown
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.flying import TUNED, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -57,7 +57,7 @@ def test_an_abort_before_the_takeoff_command_is_no_flight() -> None:
     walk = TrialDriver()
     walk.armed = True
     walk = over(aborted(walk.pass_s(0.5)))
-    assert (walk.state, walk.trial.contact, walk.trial.commanded_s) == (State.IDLE, "stayed", None)
+    assert (walk.state, walk.trial.contact, walk.trial.takeoff) == (State.IDLE, "stayed", None)
 
 
 def test_a_refused_takeoff_is_no_flight() -> None:
@@ -163,7 +163,7 @@ def test_a_vehicle_that_was_above_the_ground_before_the_takeoff_command_has_flow
     walk.climb_rate_m_s = 1.0
     walk = aborted(walk.pass_s(0.5))
     walk.climb_rate_m_s = 0.0
-    assert (walk.trial.commanded_s, walk.trial.watch.climb.lifted) == (None, True)
+    assert (walk.trial.takeoff, walk.trial.watch.climb.lifted) == (None, True)
     walk.touch_down()
     assert has_flown(walk.trial)
 

@@ -14,7 +14,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import ending_of
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink.test_trial_machine import STAGES
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 

@@ -7,7 +7,7 @@ from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
 def test_a_hover_keeps_every_limit() -> None:
     watch = told(watch_of(3.0, 3.0, 3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.05)
     assert watch.envelope.find(LIMITS, watch.last, GROUND_M, settling=True) is None
-    assert watching.find_link(watch, LIMITS, 10.1) is None
+    assert watch.link.find(LIMITS, watch.modes.heartbeat_s, 10.1) is None
     assert watching.find_frozen(watch, LIMITS, 10.3) is None
     assert watching.find_lost_position(watch, LIMITS, 10.1) is None
     assert watch.battery.find(10.1) is None

@@ -26,8 +26,8 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import Failure, Limits
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_machine import advance, begin
+from app.vehicles.mavlink.trial_state import Plan, State, Trial
 from tests.vehicles.mavlink.replaying import FLOWN, GROUND_STATION, LOGS, Recorded, messages, read, recorded
 
 PAPARAZZI = PROFILES["paparazzi"]

@@ -31,8 +31,8 @@ from app.vehicles.mavlink.events import (
     Setting,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.trial_machine import Plan, begin
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_machine import begin
+from app.vehicles.mavlink.trial_state import Plan, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
 
 ABORT = "the operator pressed Abort"
@@ -652,9 +652,9 @@ def test_a_record_ends_by_the_grounds_clock_too() -> None:
 @pytest.mark.complete
 def test_a_longer_record_allows_the_clock_the_same_share_of_delay() -> None:
     walk = TrialDriver(plan=replace(PLAN, record_s=60.4)).lift_off()
-    assert walk.trial.commanded_s is not None
+    assert walk.trial.takeoff is not None
     walk.tempo = 0.93
-    walk.pass_s(60.4 + 3.4 - (walk.now_s - walk.trial.commanded_s))
+    walk.pass_s(60.4 + 3.4 - (walk.now_s - walk.trial.takeoff.at_s))
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
     walk.pass_s(1.5)
     assert (walk.state, walk.trial.failure) == (State.LAND, None)

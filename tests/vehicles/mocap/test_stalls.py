@@ -4,7 +4,7 @@ import numpy as np
 
 from app.vehicles.mavlink.events import PacketReceived, Position, SecondaryAltitudeReceived
 from app.vehicles.mavlink.trial import in_order
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink.walking import TrialDriver
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.vehicles.mavlink.events import Position
-from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding
+from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding, Limits
 from app.vehicles.mavlink.monitors.clock import FRESH_S
 from app.vehicles.mavlink.monitors.positions import RESTING_M_S
 from app.vehicles.mavlink.states import replace
@@ -60,6 +60,14 @@ class ClimbMonitor:
 
     def has_been_near(self, altitude_m: float) -> bool:
         return self.highest_m >= altitude_m - _WITHIN_M
+
+    def find_interrupted(self, climb_to_m: float, mode: str, limits: Limits) -> Finding | None:
+        """Find a vehicle that hovers before it has been near its first set point: its failsafe or a person has stopped
+        it."""
+        if mode not in limits.hovering_modes or self.has_been_near(climb_to_m):
+            return None
+        why = f"The vehicle entered mode {limits.named(mode)} before it had climbed."
+        return Finding(failure=Failure.UNEXPECTED, why=why)
 
     def find_behind(self) -> Finding | None:
         """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""

@@ -17,8 +17,8 @@ def beating(*beats: Heartbeat) -> TrialObservation:
 
 def test_a_disarming_is_unexpected_once_heartbeats_agree() -> None:
     for count in (1, 2):
-        assert beating(*[Heartbeat(9, False, "4")] * count).modes.find_disarming(LIMITS) is None
-    found = beating(*[Heartbeat(9, False, "4")] * 3).modes.find_disarming(LIMITS)
+        assert beating(*[Heartbeat(9, False, "4")] * count).modes.find_disarming() is None
+    found = beating(*[Heartbeat(9, False, "4")] * 3).modes.find_disarming()
     assert found is not None
     assert (found.failure, found.why) == (Failure.UNEXPECTED, "The vehicle disarmed itself in the air.")
 
