@@ -7,7 +7,8 @@ import pytest
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.events import Position
-from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover, evaluate_set_points, find_reception
+from app.vehicles.mavlink.ground_observation import GroundObservation, find_reception
+from app.vehicles.mavlink.preflight import evaluate_hover, evaluate_set_points
 from app.vehicles.mavlink.profiles import PROFILES
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))
