@@ -191,7 +191,7 @@ HELP: Final = "fly it manually, or stop its motors"
 NOT_DESCENDING: Final = f"It was commanded to land but was not seen to descend: {HELP}."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """A detected failure with its explanation."""
 

@@ -84,7 +84,7 @@ def find_unsettled(trial: Trial) -> Finding | None:
         time_s = np.array([each.time_boot_s - start_s for each in trial.set_points.settling])
         altitude_m = np.array([each.altitude_m - trial.plan.datum_m for each in trial.set_points.settling])
         why = unsettled(time_s, altitude_m, first_s, trial.plan.set_points.altitudes_m[0])
-    return None if why is None else Finding(failure=Failure.NOT_SETTLED, why=f"The vehicle {why}.")
+    return None if why is None else Finding(Failure.NOT_SETTLED, f"The vehicle {why}.")
 
 
 def find_overdue(trial: Trial, now_s: float) -> Finding | None:
@@ -112,7 +112,7 @@ def find_missing(trial: Trial) -> Finding | None:
 
 
 def _not_confirmed(why: str) -> Finding:
-    return Finding(failure=Failure.SET_POINT, why=why)
+    return Finding(Failure.SET_POINT, why)
 
 
 def command_next(trial: Trial) -> Step:

@@ -35,7 +35,7 @@ def find_in_flight(trial: Trial, now_s: float) -> Finding | None:
 
 def find_noted(trial: Trial, *failures: Failure) -> Finding | None:
     """Return the trial's failure if it is one of these, which end the record."""
-    return Finding(failure=trial.failure, why=trial.why) if trial.failure in failures else None
+    return Finding(trial.failure, trial.why) if trial.failure in failures else None
 
 
 def find_taken_over(trial: Trial) -> Finding | None:

@@ -173,7 +173,7 @@ def _with_disarming(trial: Trial) -> Trial:
     fell = trial.fell_s is not None and modes.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
     if not fell and trial.disarmed_m <= DRIFT_M:
         return trial
-    return note_cause(trial, Finding(failure=Failure.UNEXPECTED, why="Its motors were stopped in the air."))
+    return note_cause(trial, Finding(Failure.UNEXPECTED, "Its motors were stopped in the air."))
 
 
 def _with_drift(trial: Trial, now_s: float) -> Trial:
@@ -205,5 +205,5 @@ def _react(trial: Trial, event: Event) -> Step:
         return stop_motors(trial, event.reason, event.now_s)
     if isinstance(event, AbortRequested) and trial.state in COMMANDED:
         trial = measure_ground(trial, event.now_s) if trial.state is State.ARM else trial
-        return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
+        return fail(trial, Finding(Failure.OPERATOR, event.reason), event.now_s)
     return HANDLERS[trial.state](trial, event)

@@ -76,7 +76,7 @@ def _arm(trial: Trial, event: Event) -> Step:
     if trial.watch.modes.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
-        return fail(measure_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
+        return fail(measure_ground(trial, now_s), Finding(Failure.NOT_ARMED, event.why), now_s)
     if finding := find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED):
         return fail(measure_ground(trial, now_s), finding, now_s)
     if finding := watching.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
@@ -114,7 +114,7 @@ def _not_armed(trial: Trial, event: Event) -> Finding | None:
     elif trial.armed_s is None:
         late = trial.arm_sent_s is not None and event.now_s - trial.arm_sent_s > ARMED_WITHIN_S
         why = "It did not report that it is armed." if late or event.now_s - trial.since_s > _ARMING_S else ""
-    return Finding(failure=Failure.NOT_ARMED, why=why) if why else None
+    return Finding(Failure.NOT_ARMED, why) if why else None
 
 
 def _take_off(trial: Trial, event: Event) -> Step:
@@ -128,7 +128,7 @@ def _take_off(trial: Trial, event: Event) -> Step:
     if isinstance(event, ActionRefused):
         if (takeoff := trial.takeoff) is not None:
             trial = replace(trial, takeoff=replace(takeoff, confirmed_boot_s=takeoff.boot_s))
-        return fail(trial, Finding(failure=Failure.TAKE_OFF_REFUSED, why=event.why), now_s)
+        return fail(trial, Finding(Failure.TAKE_OFF_REFUSED, event.why), now_s)
     if finding := _no_lift_off(trial, now_s):
         return fail(trial, finding, now_s)
     return trial, ()
@@ -140,10 +140,8 @@ def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
     if not is_late or decides_soon or not watch.positions.is_fresh(now_s):
         return None
     if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
-        why = "It reports that it flies, but its altitude stayed on the ground."
-        return Finding(failure=Failure.LOST_POSITION, why=why)
-    why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
-    return Finding(failure=Failure.NO_LIFT_OFF, why=why)
+        return Finding(Failure.LOST_POSITION, "It reports that it flies, but its altitude stayed on the ground.")
+    return Finding(Failure.NO_LIFT_OFF, f"It was still on the ground {trial.plan.lift_off_s:g} s after the command.")
 
 
 def _waited_s(trial: Trial) -> float:
@@ -161,7 +159,7 @@ def _record(trial: Trial, event: Event) -> Step:
     trial = _resting(trial, now_s)
     if _has_rested(trial, DOWN_S, now_s) and _is_armed_since(trial, trial.resting_since_s):
         stayed = _may_have_stayed(trial, now_s)
-        descended = Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself.")
+        descended = Finding(Failure.ENVELOPE, "It descended to the ground by itself.")
         if finding := _no_lift_off(trial, now_s) if stayed else descended:
             return fail(trial, finding, now_s)
     if (changed := _change_set_point(trial, event)) is not None:
@@ -198,7 +196,7 @@ def _withdraw(trial: Trial, now_s: float) -> Step:
     if is_by_hand(trial):
         return trial, ()
     why = "A heartbeat reported a manual mode, so that no further set point was commanded."
-    return land(note(trial, Finding(failure=Failure.INTERRUPTED, why=why)), State.ABORT_LAND, now_s)
+    return land(note(trial, Finding(Failure.INTERRUPTED, why)), State.ABORT_LAND, now_s)
 
 
 def _change_set_point(trial: Trial, event: Event) -> Step | None:
@@ -224,10 +222,9 @@ def _find_set_point_failure(trial: Trial, event: Event) -> Finding | None:
     """Find that a set point was refused or confirmed late, or that their stream paused."""
     match event:
         case ActionRefused(action=action, why=why) if action in _SET_POINT_ACTIONS:
-            return Finding(failure=Failure.SET_POINT, why=why)
+            return Finding(Failure.SET_POINT, why)
         case SetPointsPaused(paused_s=paused_s):
-            why = f"Gainline stalled, and sent no set point for {paused_s:.1f} s."
-            return Finding(failure=Failure.PAUSED, why=why)
+            return Finding(Failure.PAUSED, f"Gainline stalled, and sent no set point for {paused_s:.1f} s.")
         case ActionDone(action=action) if action in _SET_POINT_ACTIONS:
             return set_point_schedule.find_late(trial)
         case _:
@@ -246,7 +243,7 @@ def _overtime(trial: Trial, now_s: float) -> Step:
     if last is None or takeoff is None or (passed_s := now_s - takeoff.at_s) <= plan.record_s + plan.slow_s:
         return trial, ()
     why = f"Its clock advanced by {last.time_boot_s - takeoff.boot_s:.1f} s in {passed_s:.1f} s."
-    return fail(trial, Finding(failure=Failure.SLOW_CLOCK, why=why), now_s)
+    return fail(trial, Finding(Failure.SLOW_CLOCK, why), now_s)
 
 
 def _landing(trial: Trial, event: Event) -> Step:

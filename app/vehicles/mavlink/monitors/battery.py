@@ -25,7 +25,7 @@ class BatteryMonitor:
 
     def find(self, now_s: float) -> Finding | None:
         if self.low_since_s is not None and now_s - self.low_since_s > _LOW_S:
-            return Finding(failure=Failure.BATTERY, why=f"The battery voltage was low: {self.voltage_v:.1f} V.")
+            return Finding(Failure.BATTERY, f"The battery voltage was low: {self.voltage_v:.1f} V.")
         if now_s - self.heard_s > _UNKNOWN_S:
-            return Finding(failure=Failure.BATTERY, why=f"No battery voltage was received for {_UNKNOWN_S:g} s.")
+            return Finding(Failure.BATTERY, f"No battery voltage was received for {_UNKNOWN_S:g} s.")
         return None

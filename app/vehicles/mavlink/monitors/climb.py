@@ -66,13 +66,12 @@ class ClimbMonitor:
         it."""
         if mode not in limits.hovering_modes or self.has_been_near(climb_to_m):
             return None
-        why = f"The vehicle entered mode {limits.named(mode)} before it had climbed."
-        return Finding(failure=Failure.UNEXPECTED, why=why)
+        return Finding(Failure.UNEXPECTED, f"The vehicle entered mode {limits.named(mode)} before it had climbed.")
 
     def find_behind(self) -> Finding | None:
         """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""
         why = f"According to its climb rate it rose {self.behind_m:.1f} m more than its altitude shows."
-        return Finding(failure=Failure.LOST_POSITION, why=why) if self.is_behind else None
+        return Finding(Failure.LOST_POSITION, why) if self.is_behind else None
 
     def find_incomplete(self, climb_to_m: float) -> Finding | None:
         """Find at the end of a record that the vehicle has never been near its first set point. Its gains may have kept
@@ -83,7 +82,7 @@ class ClimbMonitor:
             f"It did not come within {_WITHIN_M:g} m of its set point, because of its gains or of a change of mode "
             "that no heartbeat reported."
         )
-        return Finding(failure=Failure.INTERRUPTED, why=why)
+        return Finding(Failure.INTERRUPTED, why)
 
     def find_sunken(self, last: Position | None, lowest_m: float, ground_m: float) -> Finding | None:
         """Find at the end of a record that the vehicle, or its altitude alone, has sunk to less than half of the lowest
@@ -93,4 +92,4 @@ class ClimbMonitor:
         if swings or not self.has_been_near(lowest_m) or height_m >= 0.5 * (lowest_m - ground_m):
             return None
         why = f"At the end of the record it was {height_m:.1f} m above the ground: it, or its altitude alone, has sunk."
-        return Finding(failure=Failure.LOST_POSITION, why=why)
+        return Finding(Failure.LOST_POSITION, why)

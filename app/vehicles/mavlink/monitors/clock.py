@@ -98,7 +98,7 @@ class ClockMonitor:
             why = f"Its clock stood still for more than {limits.stuck_s:g} s."
         elif self.stepped_s > _LONGEST_STEP_S:
             why = f"Its clock jumped ahead by {self.stepped_s:.1f} s."
-        return Finding(failure=Failure.FROZEN, why=why) if why else None
+        return Finding(Failure.FROZEN, why) if why else None
 
     def find_late(self, limits: Limits) -> Finding | None:
         """Find that positions arrive late, or that the clock is slower than it is said to be."""
@@ -108,4 +108,4 @@ class ClockMonitor:
             f"Its positions arrive more than {FRESH_S:g} s late, or its clock is slower than the clock speed in its "
             "settings."
         )
-        return Finding(failure=Failure.LOST_POSITION, why=why)
+        return Finding(Failure.LOST_POSITION, why)

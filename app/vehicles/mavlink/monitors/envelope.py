@@ -65,10 +65,10 @@ class EnvelopeMonitor:
                 why = f"It was {away_m:.1f} m from its start; the limit is {limits.radius_m:g} m."
             elif settling and self.crossings >= limits.crossings:
                 why = f"It crossed its set point {self.crossings} times by more than ±{limits.crossing_m:g} m."
-        return Finding(failure=Failure.ENVELOPE, why=why) if why else self.find_oscillation()
+        return Finding(Failure.ENVELOPE, why) if why else self.find_oscillation()
 
     def find_oscillation(self) -> Finding | None:
         if self.leaning <= _LEANING:
             return None
         why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
-        return Finding(failure=Failure.ENVELOPE, why=why)
+        return Finding(Failure.ENVELOPE, why)

@@ -64,5 +64,4 @@ class GroundMonitor:
         since_s = self.contradicted_since_s
         if since_s is None or now_s - since_s <= _CONTRADICTED_S:
             return None
-        why = "It reports that it flies, but its altitude is the ground's."
-        return Finding(failure=Failure.LOST_POSITION, why=why)
+        return Finding(Failure.LOST_POSITION, "It reports that it flies, but its altitude is the ground's.")

@@ -13,7 +13,7 @@ class IdentityMonitor:
     rebooted: bool = False
 
     def find_duplicate(self) -> Finding | None:
-        return Finding(failure=Failure.DUPLICATE, why=self.duplicate_reason) if self.duplicate_reason else None
+        return Finding(Failure.DUPLICATE, self.duplicate_reason) if self.duplicate_reason else None
 
     def find_reboot(self) -> Finding | None:
-        return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.") if self.rebooted else None
+        return Finding(Failure.UNEXPECTED, "The vehicle rebooted.") if self.rebooted else None

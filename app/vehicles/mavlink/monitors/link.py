@@ -14,7 +14,7 @@ class LinkMonitor:
     def find(self, limits: Limits, heartbeat_s: float, now_s: float) -> Finding | None:
         """Find a lost link; `heartbeat_s` is the time of the last heartbeat."""
         if now_s - self.received_s > limits.silent_s:
-            return Finding(failure=Failure.LINK, why=f"Nothing was received for more than {limits.silent_s:g} s.")
+            return Finding(Failure.LINK, f"Nothing was received for more than {limits.silent_s:g} s.")
         if now_s - heartbeat_s > HEARTBEATS_MISSED * limits.heartbeat_s:
-            return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
+            return Finding(Failure.LINK, "Three heartbeats were missed.")
         return None

@@ -50,7 +50,7 @@ class ModeMonitor:
         """Find that a pilot flies the vehicle now."""
         if not self.armed or not limits.is_manual(self.agreed):
             return None
-        return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle entered mode {limits.named(self.agreed)}.")
+        return Finding(Failure.TAKEN_OVER, f"The vehicle entered mode {limits.named(self.agreed)}.")
 
     def find_interruption(self, before: "ModeMonitor", limits: Limits) -> Finding | None:
         """Find a manual mode that only the last heartbeat of the state `before` reported and the next one did not,
@@ -59,11 +59,10 @@ class ModeMonitor:
         is_in_turn = min(before.heartbeat_gap_s, self.heartbeat_gap_s) >= _IN_TURN * limits.heartbeat_s
         if not (was_by_hand and is_in_turn) or limits.is_manual(self.mode):
             return None
-        return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat reported mode {limits.named(before.mode)}.")
+        return Finding(Failure.INTERRUPTED, f"One heartbeat reported mode {limits.named(before.mode)}.")
 
     def find_disarming(self) -> Finding | None:
-        why = "The vehicle disarmed itself in the air."
-        return Finding(failure=Failure.UNEXPECTED, why=why) if self.is_disarmed else None
+        return Finding(Failure.UNEXPECTED, "The vehicle disarmed itself in the air.") if self.is_disarmed else None
 
     def find_unexpected(self, limits: Limits, modes: frozenset[str], blocks: frozenset[str]) -> Finding | None:
         """Find a mode or block other than the allowed `modes` and `blocks`, empty if any is."""
@@ -72,7 +71,7 @@ class ModeMonitor:
             why = f"The vehicle entered mode {limits.named(self.agreed)}."
         elif blocks and self.block and self.block not in blocks:
             why = f"Its flight plan entered the block “{self.block}”."
-        return Finding(failure=Failure.UNEXPECTED, why=why) if why else None
+        return Finding(Failure.UNEXPECTED, why) if why else None
 
     def find_own_landing(
         self, limits: Limits, last: Position | None, ground_m: float, *, mode_known: bool
@@ -87,5 +86,5 @@ class ModeMonitor:
         if not why or last is None:
             return None
         if (height_m := last.altitude_m - ground_m) > limits.ceiling_m - _OWN_CEILING_M:
-            return Finding(failure=Failure.ENVELOPE, why=f"It was {height_m:.2f} m above the ground. {why}")
-        return Finding(failure=Failure.OWN_LANDING, why=why)
+            return Finding(Failure.ENVELOPE, f"It was {height_m:.2f} m above the ground. {why}")
+        return Finding(Failure.OWN_LANDING, why)

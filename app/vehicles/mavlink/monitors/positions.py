@@ -118,28 +118,27 @@ class PositionMonitor:
     def find_glitches(self) -> Finding | None:
         if self.glitches <= _MAX_GLITCHES:
             return None
-        return Finding(failure=Failure.GLITCHES, why=f"{self.glitches} samples were dropped.")
+        return Finding(Failure.GLITCHES, f"{self.glitches} samples were dropped.")
 
     def find_frozen(self) -> Finding | None:
         why = f"Its altitude stood still for more than {_UNCHANGED_S:g} s while its clock ran."
-        return Finding(failure=Failure.FROZEN, why=why) if self.unchanged_s > _UNCHANGED_S else None
+        return Finding(Failure.FROZEN, why) if self.unchanged_s > _UNCHANGED_S else None
 
     def find_implausible(self, limits: Limits, received_s: float, now_s: float) -> Finding | None:
         """Find that none is plausible; to be called after a lost link was looked for, because silence is one."""
         if min(now_s, received_s) - self.accepted_s <= limits.lost_s:
             return None
-        why = f"None of its positions was plausible for {limits.lost_s:g} s."
-        return Finding(failure=Failure.LOST_POSITION, why=why)
+        return Finding(Failure.LOST_POSITION, f"None of its positions was plausible for {limits.lost_s:g} s.")
 
     def find_unreliable(self) -> Finding | None:
         why = "Its position jumps back and forth."
-        return Finding(failure=Failure.LOST_POSITION, why=why) if self.doubt_level > _DOUBTED_LIMIT else None
+        return Finding(Failure.LOST_POSITION, why) if self.doubt_level > _DOUBTED_LIMIT else None
 
     def find_jump(self) -> Finding | None:
         """Find a jump of the altitude in flight: it, or the earlier altitude, is not the vehicle's."""
         if self.jumped_m <= _JUMP_ENDS_RECORD_M:
             return None
-        return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude jumped by {self.jumped_m:.1f} m.")
+        return Finding(Failure.LOST_POSITION, f"Its altitude jumped by {self.jumped_m:.1f} m.")
 
     def find_departure(self, ground_m: float, *, stands: bool) -> Finding | None:
         """Find that a vehicle without a takeoff command may have left the ground, by its altitude, or that its altitude
@@ -149,7 +148,7 @@ class PositionMonitor:
         what = "although it stood on the ground: wait until its estimate has settled"
         what = what if stands else "and it may have moved"
         why = f"Its altitude changed by {away_m:+.2f} m before the takeoff command, {what}."
-        return Finding(failure=Failure.LOST_POSITION, why=why)
+        return Finding(Failure.LOST_POSITION, why)
 
     def find_drift(self, now_s: float, ground_m: float, *, has_landed: bool) -> Finding | None:
         """Find that the altitude of a flown vehicle has drifted: it is below the ground, or above it where the vehicle
@@ -159,9 +158,7 @@ class PositionMonitor:
         off_m = self.last.altitude_m - ground_m
         if off_m >= -DRIFT_M and not (off_m > DRIFT_M and has_landed):
             return None
-        return Finding(
-            failure=Failure.LOST_POSITION, why=f"Its altitude has drifted: it was {off_m:+.1f} m on the ground."
-        )
+        return Finding(Failure.LOST_POSITION, f"Its altitude has drifted: it was {off_m:+.1f} m on the ground.")
 
     def find_fall(self, limits: Limits, ground_m: float) -> Finding | None:
         """Find ground contact at a speed above that of any landing."""
@@ -171,7 +168,7 @@ class PositionMonitor:
         near = last.altitude_m - ground_m < _IMPACT_BELOW_M
         if not near or last.climb_rate_m_s >= -limits.impact_m_s:
             return None
-        return Finding(failure=Failure.FALL, why=f"It hit the ground at {-last.climb_rate_m_s:.1f} m/s.")
+        return Finding(Failure.FALL, f"It hit the ground at {-last.climb_rate_m_s:.1f} m/s.")
 
 
 def _follows(one: Position, other: Position) -> bool:

@@ -53,13 +53,13 @@ class SecondSourceMonitor:
             why = f"The second source of altitude did not track it for more than {limits.stuck_s:g} s."
         elif self.received_s is not None and now_s - self.received_s > limits.silent_s:
             why = f"Nothing was received from the second source of altitude for {limits.silent_s:g} s."
-        return Finding(failure=Failure.FROZEN, why=why) if why else None
+        return Finding(Failure.FROZEN, why) if why else None
 
     def find_disagreement(self) -> Finding | None:
         if self.received_s is None or self.apart_since_s is None or self.received_s - self.apart_since_s <= _APART_S:
             return None
         allowed = f"more than {MAX_DIFFERENCE_M:g} m for {_APART_S:g} s is not allowed"
-        return Finding(failure=Failure.DISAGREEMENT, why=f"They were {self.apart_m:.2f} m apart; {allowed}.")
+        return Finding(Failure.DISAGREEMENT, f"They were {self.apart_m:.2f} m apart; {allowed}.")
 
     def find_disagreement_on_ground(self, altitude_m: float, ground_shift_m: float, now_s: float) -> Finding | None:
         """Find a disagreement between the vehicle's altitude on the ground and the source's last one before a shift."""
@@ -67,5 +67,4 @@ class SecondSourceMonitor:
         apart_m = 0.0 if second_m is None else abs(second_m + ground_shift_m - altitude_m)
         if apart_m <= MAX_DIFFERENCE_M:
             return None
-        why = f"They were {apart_m:.2f} m apart before the takeoff command."
-        return Finding(failure=Failure.DISAGREEMENT, why=why)
+        return Finding(Failure.DISAGREEMENT, f"They were {apart_m:.2f} m apart before the takeoff command.")

@@ -57,6 +57,6 @@ class SetPointMonitor:
                 return self if astray_s == since_s else replace(self, astray_since_s=astray_s), None
             case Heartbeat(mode=mode) if since_s is not None and now_s - since_s >= _ASTRAY_S:
                 why = "Its set point was changed by a command that was not Gainline's."
-                return self, Finding(failure=Failure.INTERRUPTED, why=why) if mode in following_modes else None
+                return self, Finding(Failure.INTERRUPTED, why) if mode in following_modes else None
             case _:
                 return self, None

@@ -31,12 +31,10 @@ class SettingMonitor:
         if name not in suspects:
             return replace(self, suspects=suspects | {name}), None
         if mode is not None and name == mode.name:
-            why = f"The vehicle entered mode {limits.named(mode.modes[value])}."
-            return self, Finding(failure=Failure.UNEXPECTED, why=why)
-        why = f"{name} changed to {value:g} by a command that was not Gainline's."
-        return self, Finding(failure=Failure.INTERRUPTED, why=why)
+            return self, Finding(Failure.UNEXPECTED, f"The vehicle entered mode {limits.named(mode.modes[value])}.")
+        return self, Finding(Failure.INTERRUPTED, f"{name} changed to {value:g} by a command that was not Gainline's.")
 
     def find_unconfirmed(self) -> Finding | None:
         names = ", ".join(sorted(self.suspects))
         why = f"{names} was reported with another value, and no reply confirmed which holds."
-        return Finding(failure=Failure.INTERRUPTED, why=why) if names else None
+        return Finding(Failure.INTERRUPTED, why) if names else None
