@@ -40,7 +40,7 @@ class ClimbMonitor:
             if not (self.lifted or self.is_behind):
                 mean_m_s = 0.5 * (last.climb_rate_m_s + position.climb_rate_m_s)
                 climbed_m = (mean_m_s if abs(mean_m_s) > RESTING_M_S else 0.0) * passed_s
-                behind_m += climbed_m - (position.altitude_m - last.altitude_m)
+                behind_m = behind_m + climbed_m - (position.altitude_m - last.altitude_m)
         if (highest_m, unseen_m, behind_m) == (self.highest_m, self.unseen_m, self.behind_m):
             return self
         return replace(self, highest_m=highest_m, unseen_m=unseen_m, behind_m=behind_m)
