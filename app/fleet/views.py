@@ -22,6 +22,7 @@ from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
+from app.vehicles.end_texts import end_text
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS
 
@@ -134,7 +135,7 @@ def _command_outcome(kind: ActKind, flight: FlightRow) -> tuple[ActState, str]:
     if is_done:
         return ActState.DONE, ""
     if is_over:
-        return ActState.FAILED, flight.problem or "The flight had ended before."
+        return ActState.FAILED, end_text(flight.end) or "The flight had ended before."
     return ActState.REQUESTED if flight.state == FlightState.REQUESTED else ActState.RUNNING, ""
 
 

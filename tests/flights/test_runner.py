@@ -21,6 +21,7 @@ from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
 from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
+from app.vehicles.flight_end import StopRequest
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.campaigns.trials.states import make_vehicle_real
 from tests.clocks import SimulatedClock
@@ -135,7 +136,7 @@ def test_an_abort_while_the_lift_off_is_stored_is_no_flight(
     client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:
     """Observed defect: it was an aborted flight, landed, whose cause had to be given."""
-    when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, "somebody walked in"))
+    when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, StopRequest("somebody walked in")))
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["flown_at"], ended["record"]) == ("planned", None, None)
@@ -154,7 +155,9 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
 ) -> None:
     seen: list[bool] = []
 
-    when_changed_to(FlightState.RUNNING, lambda: seen.append(field.abort_registry.abort(trial_id, "changed my mind")))
+    when_changed_to(
+        FlightState.RUNNING, lambda: seen.append(field.abort_registry.abort(trial_id, StopRequest("changed my mind")))
+    )
     field.fly_next()
     assert seen == [True]
     ended = get(client, f"/api/trials/{trial_id}")

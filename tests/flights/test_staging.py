@@ -24,6 +24,7 @@ from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_ad
 from app.live.server import LiveServer
 from app.main import create_app
 from app.vehicles.base import FlightRecord
+from app.vehicles.flight_end import Failure, FlightEnd, Landing, Requester, StopRequest
 from tests.builders import (
     WORKER,
     Json,
@@ -46,6 +47,8 @@ from tests.fleet.vehicles import (
 )
 from tests.unlocking import HERE, unlock
 from tests.vehicles.mavlink.test_before_lift_off import stopped as stopped_drone
+
+UNSTAGED = FlightEnd(request=StopRequest(), landed=Landing.STAYED)
 
 
 @pytest.fixture(autouse=True)
@@ -105,13 +108,13 @@ def take_off(client: TestClient, staged: Json, headers: dict[str, str]) -> tuple
 
 def unstage_claimed(database: Database, staged: Json) -> None:
     """Its worker restores the safe gains instead of taking off."""
-    outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)
+    outcome = FlightOutcome(withdrawn=True, end=UNSTAGED, restored=DEFAULT_GAINS)
     with database.write() as session:
         flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
 
 
-def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
-    """Whether its worker may take off, and why it is to stand down."""
+def is_wanted(database: Database, staged: Json) -> tuple[bool, FlightOutcome | None]:
+    """Whether its worker may take off, and the outcome if it is to stand down."""
     with database.read() as session:
         flight_id = staged["flight"]["id"]
         return flight_rows.clearance_of(session, flight_id)
@@ -184,7 +187,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     with database.write() as session:
         session.get_one(FlightRow, staged["flight"]["id"]).take_off_at = utc_now() - timedelta(seconds=11)
     why = "the takeoff did not start within 10 s of the operator's request"
-    assert is_wanted(database, staged) == (False, why)
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, problem=why))
     with pytest.raises(ConflictError, match=why), database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
 
@@ -226,7 +229,7 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
     assert (answer.status_code, answer.json()["state"]) == (202, "staged")
     assert answer.json()["flight"]["standing_down"] == "unstaged by the operator"
     assert answer.json()["actions"] == ["cancel", "abort", "note"]
-    assert is_wanted(database, staged) == (False, "unstaged by the operator")
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, end=UNSTAGED))
     assert take_off(client, staged, headers) == (
         409,
         f"Flight {staged['number']} is being unstaged: unstaged by the operator.",
@@ -263,7 +266,7 @@ def test_a_take_off_does_not_pass_an_unstaging(
 @pytest.mark.complete
 def test_a_cancelled_trial_stands_its_vehicle_down(client: TestClient, database: Database, staged: Json) -> None:
     assert client.post(f"/api/trials/{staged['id']}/cancel").status_code == 200
-    assert is_wanted(database, staged) == (False, "the trial is cancelled")
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, problem="the trial is cancelled"))
 
 
 @pytest.mark.complete
@@ -273,7 +276,7 @@ def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     with database.write() as session:
         assert flight_rows.lose_running_flights(session) == []
-    assert is_wanted(database, staged) == (False, "the flight is failed")
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, problem="the flight is failed"))
     after = trial(client, staged)
     assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker stopped before lift-off")
     assert seen(client, real)["state"] == "quarantined"
@@ -502,9 +505,15 @@ def test_the_command_log_follows_a_flight(client: TestClient, database: Database
 LANDED = "Gainline was stopped. It landed the vehicle and restored the safe gains."
 
 
-def stopped(restored: Json | None = DEFAULT_GAINS, **fields: Any) -> FlightOutcome:
-    record = create_record(ending="aborted", on_request=True, until_s=4.0, **fields)
-    return FlightOutcome(record=record, restored=restored)
+def stopped(
+    by: Requester = Requester.PROGRAM_STOPPED,
+    said: str = "",
+    *,
+    restored: Json | None = DEFAULT_GAINS,
+    remark: str = "",
+) -> FlightOutcome:
+    end = FlightEnd(failure=Failure.OPERATOR, request=StopRequest(said, by=by), remarks=(remark,) if remark else ())
+    return FlightOutcome(record=replace(create_record(ending="aborted", until_s=4.0), end=end), restored=restored)
 
 
 @pytest.mark.complete
@@ -512,17 +521,17 @@ def stopped(restored: Json | None = DEFAULT_GAINS, **fields: Any) -> FlightOutco
     ("outcome", "reason", "cause"),
     [
         (
-            stopped(reason="Gainline was stopped"),
+            stopped(),
             LANDED,
             "something else",
         ),
         (
-            stopped(reason="Gainline was stopped 2 samples jumped and were dropped."),
+            stopped(remark="2 samples jumped and were dropped."),
             f"{LANDED} 2 samples jumped and were dropped.",
             "something else",
         ),
-        (stopped(restored=None, reason="Gainline was stopped"), "Gainline was stopped", "something else"),
-        (stopped(reason="too close"), "too close", "operator"),
+        (stopped(restored=None), "Gainline was stopped", "something else"),
+        (stopped(Requester.OPERATOR, "too close"), "too close", "operator"),
     ],
 )
 def test_a_flight_that_ended_because_gainline_was_stopped_says_so_and_asks_for_no_cause(
@@ -626,7 +635,7 @@ def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_not_said_to_have_land
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     record, _, concern = stopped_drone("paparazzi", 4.0, motors_off=motors_off)
     assert bool(concern) == motors_off
-    outcome = FlightOutcome(record=replace(record, on_request=True), concern=concern)
+    outcome = FlightOutcome(record=record, concern=concern)
     with database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
         flight_rows.record_outcome(session, staged["flight"]["id"], outcome)

@@ -21,11 +21,12 @@ from app.vehicles.base import (
     SafeGainsError,
     VehicleError,
 )
+from app.vehicles.end_texts import FAILURE_TEXTS
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.boot_clock import unwrapped
 from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
-from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import PROFILES, base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
@@ -139,7 +140,7 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
             "Otherwise check that no other vehicle sends to this address.",
         )
     raise VehicleError(
-        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title}.",
+        f"{FAILURE_TEXTS[Failure.NO_HEARTBEAT]} Waited {within_s:g} s at {address} for {radio.profile.title}.",
         hint="Check that the vehicle is on, that it sends to this computer's port, and that the right autopilot is "
         "selected.",
     )

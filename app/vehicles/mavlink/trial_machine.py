@@ -8,10 +8,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from app.vehicles.flight_end import Landing
 from app.vehicles.mavlink import limit_checks, set_point_schedule
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
-    AbortRequested,
     Action,
     ActionDone,
     ActionRefused,
@@ -21,7 +21,6 @@ from app.vehicles.mavlink.events import (
     GainsRestored,
     Heartbeat,
     Measurement,
-    MotorsOffRequested,
     PacketReceived,
     Parameter,
     PerformAction,
@@ -31,6 +30,7 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     SecondaryAltitudeReceived,
     SetPointsPaused,
+    StopRequested,
     WithdrawSetPoint,
     confirms_motors_off,
 )
@@ -197,7 +197,7 @@ def _with_fall(trial: Trial, now_s: float) -> Trial:
     if trial.stopped or trial.commanded_s is None or trial.fell_s is not None:
         return trial
     fall = limit_checks.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
-    return trial if fall is None else replace(note(trial, fall), contact="fell", fell_s=now_s)
+    return trial if fall is None else replace(note(trial, fall), contact=Landing.FELL, fell_s=now_s)
 
 
 def _with_disarming(trial: Trial) -> Trial:
@@ -237,11 +237,11 @@ def _with_jump(trial: Trial) -> Trial:
 
 
 def _react(trial: Trial, event: Event) -> Step:
-    if isinstance(event, MotorsOffRequested):
-        return stop_motors(trial, event.reason, event.now_s)
-    if isinstance(event, AbortRequested) and trial.state in COMMANDED:
+    if isinstance(event, StopRequested) and event.request.motors_off:
+        return stop_motors(trial, event.request, event.now_s)
+    if isinstance(event, StopRequested) and trial.state in COMMANDED:
         trial = measure_ground(trial, event.now_s) if trial.state is State.ARM else trial
-        return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
+        return fail(trial, Finding(failure=Failure.OPERATOR, request=event.request), event.now_s)
     return _HANDLERS[trial.state](trial, event)
 
 
@@ -526,8 +526,8 @@ def _disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     trial = _answered(_doubting(trial), event)
     if _is_stopped(trial, event):
-        confirmed = " The vehicle confirmed that its motors have stopped." if trial.stopped else ""
-        trial = replace(trial, why=trial.why + confirmed, contact=find_contact(trial, now_s))
+        confirmed = ("The vehicle confirmed that its motors have stopped.",) if trial.stopped else ()
+        trial = replace(trial, remarks=(*trial.remarks, *confirmed), contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     watch, plan = trial.watch, trial.plan
     stands = trial.commanded_s is None and watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)

@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
-from typing import Final, Literal
+from typing import Final
 
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
-from app.vehicles.base import RECORDED_BEYOND_S, motors_off_requested
+from app.vehicles.base import RECORDED_BEYOND_S
+from app.vehicles.end_texts import joined, request_text
+from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Action,
@@ -177,11 +179,6 @@ class Plan:
         return moved.with_set_point(self.limits.set_point_m + moved.datum_m - self.datum_m)
 
 
-Contact = Literal["unknown", "stayed", "landed", "fell"]
-"""Contact with the ground once the motors have stopped. stayed: it has never left the ground. fell: its motors may have
-been stopped in the air, or it hit the ground hard. unknown: its motors were not seen to stop."""
-
-
 @dataclass(frozen=True, slots=True)
 class SetPointChange:
     """A set point that the vehicle has confirmed, in the record's altitude. `times_s`, in s since the takeoff command
@@ -197,7 +194,8 @@ class Trial:
 
     `commanded_boot_s` is the vehicle's own time of the last sample before the takeoff command, `commanded_in` its mode
     then. `confirmed_boot_s` is its own time when it first replied to a message sent after that command; until then the
-    command may still be under way to it. `failure` is the first failure. `stopped`: a person has requested motors off;
+    command may still be under way to it. `failure` is the first failure, `request` what ended the trial if that is
+    none of its own. `stopped`: a person has requested motors off;
     `answered`: the vehicle has replied to the command to stop them. `ground_samples` are its positions between arming
     and the takeoff command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
     the reason why it will be quarantined at the end, however it lands. `changes` are the set points after the
@@ -214,7 +212,8 @@ class Trial:
     since_s: float
     watch: TrialObservation
     failure: Failure | None = None
-    why: str = ""
+    request: StopRequest | None = None
+    remarks: tuple[str, ...] = ()
     arm_sent_s: float | None = None
     armed_s: float | None = None
     commanded_s: float | None = None
@@ -237,7 +236,7 @@ class Trial:
     disarmed_m: float = 0.0
     fell_s: float | None = None
     doubt: str = ""
-    contact: Contact = "unknown"
+    contact: Landing = Landing.UNKNOWN
     changes: tuple[SetPointChange, ...] = ()
     changes_set_point: bool = False
     settling: tuple[Position, ...] = ()
@@ -247,6 +246,11 @@ class Trial:
     @property
     def is_over(self) -> bool:
         return self.state in OVER
+
+    @property
+    def why(self) -> str:
+        """Why it failed, for people."""
+        return joined("" if self.request is None else request_text(self.request), *self.remarks)
 
     @property
     def has_set_point(self) -> bool:
@@ -313,7 +317,7 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
         return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else _abort_landing(trial, now_s)
     reaction = RESPONSES[finding.failure].reaction
     if reaction == "cease":
-        return quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
+        return quarantine(trial, finding.why, now_s)
     if trial.state in (State.ABORT_LAND, State.LINK_LOST):
         return (
             abort_with_safe_gains(trial, now_s)
@@ -345,7 +349,8 @@ def note(trial: Trial, finding: Finding) -> Trial:
         trial = replace(trial, doubt=finding.why)
     if trial.failure is not None:
         return trial
-    return replace(trial, failure=finding.failure, why=finding.why)
+    remarks = (finding.why,) if finding.why else ()
+    return replace(trial, failure=finding.failure, request=finding.request, remarks=remarks)
 
 
 def note_cause(trial: Trial, finding: Finding) -> Trial:
@@ -407,15 +412,18 @@ def request_reply(trial: Trial, now_s: float) -> Step:
     return replace(trial, requested_s=now_s), (RequestGain(trial.plan.safe_gains[0].parameter),)
 
 
-def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
+def stop_motors(trial: Trial, request: StopRequest, now_s: float) -> Step:
     """Stop the motors at once, at any height; disarm repeats the command. A trial that has not failed is aborted, and a
     vehicle that may have fallen is quarantined at its end."""
     if trial.stopped:
         return trial, ()
-    why, failure = joined(trial.why, motors_off_requested(reason)), trial.failure or Failure.OPERATOR
     drop = _find_drop(trial, now_s)
-    doubt, contact = trial.doubt or drop, "fell" if drop else trial.contact
-    trial = replace(trial, failure=failure, why=why, doubt=doubt, contact=contact, stopped=True, answered=False)
+    if trial.failure is None:
+        trial = note(trial, Finding(failure=Failure.OPERATOR, request=request))
+    else:
+        trial = replace(trial, remarks=(*trial.remarks, request_text(request)))
+    doubt, contact = trial.doubt or drop, Landing.FELL if drop else trial.contact
+    trial = replace(trial, doubt=doubt, contact=contact, stopped=True, answered=False)
     trial = replace(trial, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
@@ -438,11 +446,11 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     return "The vehicle was not known to be on the ground: inspect it before it flies again."
 
 
-def find_contact(trial: Trial, now_s: float) -> Contact:
+def find_contact(trial: Trial, now_s: float) -> Landing:
     """Return the contact with the ground of a vehicle whose motors have stopped now."""
-    if trial.contact == "fell":
-        return "fell"
-    return "stayed" if _has_stayed_down(trial, now_s) else "landed"
+    if trial.contact is Landing.FELL:
+        return Landing.FELL
+    return Landing.STAYED if _has_stayed_down(trial, now_s) else Landing.LANDED
 
 
 def _has_stayed_down(trial: Trial, now_s: float) -> bool:
@@ -459,12 +467,8 @@ def _has_stayed_down(trial: Trial, now_s: float) -> bool:
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:
-    parts = (trial.why, *(part for part in dict.fromkeys((trial.doubt, why)) if part not in trial.why))
-    return replace(enter(trial, State.QUARANTINE, now_s), why=joined(*parts)), ()
-
-
-def joined(*parts: str) -> str:
-    return " ".join(part for part in parts if part)
+    remarks = tuple(dict.fromkeys(filter(None, (*trial.remarks, trial.doubt, why))))
+    return replace(enter(trial, State.QUARANTINE, now_s), remarks=remarks), ()
 
 
 def send_gains(trial: Trial, event: Event) -> Step:

@@ -21,9 +21,9 @@ from app.vehicles.base import (
     Sample,
     ShouldStop,
     VehicleError,
-    motors_off_requested,
-    requested,
 )
+from app.vehicles.end_texts import cause_text, requested
+from app.vehicles.flight_end import FlightEnd, Landing, withdrawn_by
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight, records
 from app.vehicles.mavlink import observation as watching
@@ -205,7 +205,7 @@ class MavlinkVehicle:
         if stop is not None:
             self.has_stopped = self._radio.is_disarmed
             self._restore_or_quarantine()
-            return self._not_begun(ground, stop.reason, has_flown=False)
+            return self._not_begun(ground, withdrawn_by(stop))
         flown = self._fly(ground, order, reference, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
@@ -339,15 +339,15 @@ class MavlinkVehicle:
         """Restore the safe gains and the other parameters of a trial; return the problem, or an empty string."""
         return self._gains.restore_or_explain() or self._parameters.restore()
 
-    def land(self, reason: str) -> None:
+    def land(self, said: str) -> None:
         """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
-        self._requested, self.has_stopped = requested("Land", reason), bool(self.has_stopped)
+        self._requested, self.has_stopped = requested("Land", said), bool(self.has_stopped)
         self._repeated = RepeatedCommand(self._radio, Action.LAND)
 
-    def motors_off(self, reason: str) -> None:
+    def motors_off(self, said: str) -> None:
         """Stop the motors at once, at any height. A vehicle that may have been in the air, or that does not confirm it,
         is only observed from then on."""
-        self._requested, self.has_stopped = motors_off_requested(reason), None
+        self._requested, self.has_stopped = requested("Motors off", said), None
         self._repeated = RepeatedCommand(self._radio, Action.KILL)
         if self._flight is None and not self._radio.is_disarmed:
             self._doubt_stop(_DROPPED)
@@ -747,11 +747,12 @@ class MavlinkVehicle:
         """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
         aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
-        reason = records.reason_of(trial)
         if start_s is None and trial.failure is Failure.OPERATOR:
-            return self._not_begun(ground, reason, has_flown=trial.watch.lifted)
+            landed = trial.contact if trial.watch.lifted else Landing.STAYED
+            return self._not_begun(ground, replace(records.end_of(trial), landed=landed))
         if start_s is None:
-            refusal = VehicleError(reason, hint="Inspect the vehicle, correct this, then fly again.")
+            why = cause_text(records.end_of(trial))
+            refusal = VehicleError(why, hint="Inspect the vehicle, correct this, then fly again.")
             refusal.not_flown = True
             raise refusal
         plan = trial.plan
@@ -775,24 +776,15 @@ class MavlinkVehicle:
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
-            failure="" if trial.failure is None else trial.failure.value,
-            reason=" ".join(part for part in (reason, _LAND_WAS_REPEATED if lands else "", both.remark) if part),
-            has_flown=records.has_flown(trial),
-            settings={**self._options, **self._loop, **both.settings, **records.contact_of(trial)},
+            end=records.end_of(trial, _LAND_WAS_REPEATED if lands else "", both.remark),
+            settings={**self._options, **self._loop, **both.settings},
         )
 
-    def _not_begun(self, ground: Ground, reason: str, *, has_flown: bool) -> FlightRecord:
+    def _not_begun(self, ground: Ground, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
-        return FlightRecord(
-            trajectory=trajectory,
-            ending="aborted",
-            failure=Failure.OPERATOR.value,
-            reason=reason,
-            has_flown=has_flown,
-            settings=self._options,
-        )
+        return FlightRecord(trajectory=trajectory, ending="aborted", end=end, settings=self._options)
 
     # ---- states
 

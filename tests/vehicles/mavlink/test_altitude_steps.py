@@ -9,7 +9,8 @@ from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
 from app.simdrone.copter_parameters import Parameters
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.registry import open_vehicle

@@ -14,9 +14,9 @@ from app.vehicles.base import (
     FlightRecord,
     InterruptedByOrderError,
     SafeGainsError,
-    StopRequest,
     VehicleError,
 )
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
