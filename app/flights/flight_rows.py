@@ -35,6 +35,7 @@ from app.vehicles.flight_end import FlightEnd, GainsLeft, Landing, Requester, St
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
+_NO_RECORD: Final = "its process ended without a record"
 _WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "the worker stopped before lift-off"}
 
 
@@ -57,11 +58,17 @@ class FlightOutcome:
     unheard: bool = False
     restored: Mapping[str, float] | None = None
 
-    def end_on_safe_gains(self, safe_gains: Mapping[str, float] | None) -> FlightEnd:
+    @property
+    def ended(self) -> FlightEnd:
+        """How the flight ended, as its record, the request or the problem tells."""
+        if self.record is not None:
+            return self.record.end
+        if self.lifted_off:
+            return FlightEnd(remarks=(self.problem or _NO_RECORD,), landed=Landing.UNKNOWN)
+        return self.end or not_begun(self.problem)
+
+    def gains_left(self, end: FlightEnd, safe_gains: Mapping[str, float] | None) -> FlightEnd:
         """The end, with what was read back of the safe gains."""
-        landed = Landing.UNKNOWN if self.lifted_off else Landing.STAYED
-        end = self.end or replace(not_begun(self.problem), landed=landed)
-        end = end if self.record is None else self.record.end
         if self.restored is None:
             return end
         if self.restored != safe_gains:
@@ -223,7 +230,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     if not may_take_off:
         why = "its takeoff has not been requested"
         if stands_down is not None:
-            why = end_text(stands_down.end_on_safe_gains(None))
+            why = end_text(stands_down.ended)
         raise ConflictError(
             f"Flight {trial.number} cannot be flown: {why}.", hint="Stage it again if it is still needed."
         )
@@ -247,7 +254,7 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     when the record cannot be stored.
     """
     flight, campaign = _read(session, flight_id)
-    end = outcome.end_on_safe_gains(flight.safe_gains)
+    end = outcome.gains_left(outcome.ended if flight.end is None else flight.end, flight.safe_gains)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
             _land(session, campaign, flight, replace(outcome.record, end=end))
@@ -256,6 +263,7 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
         else:
             state = FlightState.CANCELLED if outcome.withdrawn else FlightState.FAILED
             _end_unflown(session, campaign, flight, state, end)
+    flight.end = end
     if outcome.restored is not None:
         flight.restored, flight.restored_at = dict(outcome.restored), utc_now()
         fleet.hold_gains(flight.vehicle, outcome.restored)
@@ -302,7 +310,7 @@ def _land(session: Session, campaign: CampaignRow, flight: FlightRow, record: Fl
 def _lose(session: Session, campaign: CampaignRow, flight: FlightRow, end: FlightEnd) -> None:
     """Record that it is unknown how the flight ended."""
     set_trial_state(flight.trial, TrialState.LOST, reason="")
-    flight.trial.end = end = replace(end, remarks=end.remarks or ("its process ended without a record",))
+    flight.trial.end = end
     _end(flight, FlightState.LOST, end)
     _doubt_vehicle(flight)
     proposals.finish_flying(session, campaign)
