@@ -68,7 +68,7 @@ def _spread_of(given: JsonObject) -> JsonObject:
 
 
 def _concise(given: FlightEnd) -> FlightEnd:
-    words = given.remarks if given.request is None else (*given.remarks, given.request.said)
+    words = given.remarks if given.request is None else (*given.remarks, given.request.words)
     if sum(map(len, words)) > _MAX_CHARACTERS:
         raise ValueError(f"has more than {_MAX_CHARACTERS} characters")
     return given

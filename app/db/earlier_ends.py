@@ -1,6 +1,6 @@
 """Ends of flights in the words of earlier versions, for the migration to revision 0010 and bundles before version 6.
 
-It is a record of what those versions wrote, and nothing else reads it. What is not recognised stays as it was told.
+It is a record of what those versions wrote, and nothing else reads it. What is not recognised stays as it was.
 """
 
 import re
@@ -54,17 +54,17 @@ _RESTORED: Final = re.compile(
     r"Request the flight again if it is still needed\.) ?"
 )
 _MOTORS_OFF: Final = re.compile(
-    r"Motors off was (?:(?:requested by|asked for: asked for by) the operator|(?:requested|asked for): (?P<said>.+?))\."
-    r"(?: |$)"
+    r"Motors off was (?:(?:requested by|asked for: asked for by) the operator|(?:requested|asked for): (?P<words>.+?))"
+    r"\.(?: |$)"
 )
 _BY_OPERATOR: Final = re.compile(r"(?:aborted )?by the operator(?:\. | |$)")
 _REQUESTED: Final = frozenset({"operator", "behaved badly", "something else"})
 """Causes of an abort that a person requested."""
 
 
-def read_end(told: str, *, on_request: bool = False, landed: str = "landed", gains_left: str = "unknown") -> Any:
+def read_end(text: str, *, on_request: bool = False, landed: str = "landed", gains_left: str = "unknown") -> Any:
     """Return the end of a flight as it is stored now. `on_request`: it is known that a person ended it."""
-    failure, request, rest = None, None, told
+    failure, request, rest = None, None, text
     if (found := _ON_GROUND.match(rest)) is not None:
         landed, on_request, rest = "stayed", on_request or found[1] == "aborted", rest[found.end() :]
     if rest in ORIGINS:
@@ -74,7 +74,7 @@ def read_end(told: str, *, on_request: bool = False, landed: str = "landed", gai
         if (known := _RESTORED.match(rest)) is not None:
             gains_left, rest = "safe", rest[known.end() :]
     elif (found := _MOTORS_OFF.match(rest)) is not None:
-        failure, request, rest = "F8", _request(found["said"] or "", motors_off=True), rest[found.end() :]
+        failure, request, rest = "F8", _request(found["words"] or "", motors_off=True), rest[found.end() :]
     elif (found := _BY_OPERATOR.match(rest)) is not None:
         failure, request, rest = "F8", _request(), rest[found.end() :]
     elif (begin := next((begin for begin in _FAILURES if rest.startswith(begin)), None)) is not None:
@@ -90,8 +90,8 @@ def read_end(told: str, *, on_request: bool = False, landed: str = "landed", gai
     }
 
 
-def _request(said: str = "", *, by: str = "operator", motors_off: bool = False) -> dict[str, object]:
-    return {"said": said, "motors_off": motors_off, "by": by}
+def _request(words: str = "", *, by: str = "operator", motors_off: bool = False) -> dict[str, object]:
+    return {"words": words, "motors_off": motors_off, "by": by}
 
 
 def is_recognised(end: Mapping[str, Any]) -> bool:
@@ -126,7 +126,7 @@ def tell(end: Mapping[str, Any] | None) -> str:
     if request is not None and request["by"] == "program stopped":
         first = "Gainline was stopped"
     elif request is not None and request["motors_off"]:
-        first = f"Motors off was requested{': ' if request['said'] else ' by the operator'}{request['said']}."
+        first = f"Motors off was requested{': ' if request['words'] else ' by the operator'}{request['words']}."
     elif request is not None:
-        first = request["said"] or "aborted by the operator"
+        first = request["words"] or "aborted by the operator"
     return " ".join(filter(None, (first, *end["remarks"])))

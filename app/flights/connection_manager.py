@@ -117,7 +117,7 @@ class VehicleConnectionManager:
 
     # ---- from any thread
 
-    def order(self, vehicle_id: int, order: VehicleCommandKind, said: str, by_s: float) -> Future[str]:
+    def order(self, vehicle_id: int, order: VehicleCommandKind, words: str, by_s: float) -> Future[str]:
         """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was.
 
         A flight that waits for its takeoff stands down as well.
@@ -125,14 +125,14 @@ class VehicleConnectionManager:
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:
             return _refused(NO_LINK)
-        answer = session.send_command(order, said, by_s)
+        answer = session.send_command(order, words, by_s)
         if (trial_id := session.trial_id) is not None:
-            self._abort_registry.abort(trial_id, StopRequest(said))
+            self._abort_registry.abort(trial_id, StopRequest(words))
         return answer
 
-    def abort(self, trial_id: int, said: str) -> bool:
+    def abort(self, trial_id: int, words: str) -> bool:
         """Abort the trial's flight, then record that. Returns whether that trial is being flown here."""
-        request = StopRequest(said)
+        request = StopRequest(words)
         accepted = self._abort_registry.abort(trial_id, request)
         if accepted:
             self._record_in_background(lambda t: record_abort(t, trial_id, request))
@@ -329,9 +329,9 @@ class VehicleConnectionManager:
                 if concern and concern != slot.concern:
                     self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern
-            case CommandForwarded(order=order, said=said, problem=problem):
+            case CommandForwarded(order=order, words=words, problem=problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
-                reason = said or REQUESTED_BY_OPERATOR
+                reason = words or REQUESTED_BY_OPERATOR
                 self._record_in_background(
                     lambda t: commands.record_command(t, vehicle_id, kind, reason, problem=problem)
                 )

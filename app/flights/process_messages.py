@@ -179,13 +179,13 @@ class VehicleResponse:
 class VehicleCommand:
     """To the process, at any moment: land, or motors off.
 
-    `said` are the words of who asked, if any. Not to be carried out after `by_s` of this computer's monotonic clock, s.
+    `words` are those of who asked, if any. Not to be carried out after `by_s` of this computer's monotonic clock, s.
     The answer carries the same `number`.
     """
 
     number: int
     order: VehicleCommandKind
-    said: str
+    words: str
     by_s: float
 
 
@@ -196,7 +196,7 @@ class CommandForwarded:
 
     number: int
     order: VehicleCommandKind
-    said: str
+    words: str
     problem: str = ""
     is_awaited: bool = False
 

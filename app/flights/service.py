@@ -254,7 +254,7 @@ def _staged(session: Session, row: TrialRow) -> FlightRow:
     return flight
 
 
-def withdraw_flight(session: Session, trial_id: int, said: str) -> AbortAnswer:
+def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
     """Abort a flight that no worker has claimed; a flight that is over is left as it is.
 
     Raises ConflictError when no flight was requested, or when the worker that flies it does not answer.
@@ -262,8 +262,8 @@ def withdraw_flight(session: Session, trial_id: int, said: str) -> AbortAnswer:
     row = history.trial_row(session, trial_id)
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(said)))
-        record_abort(session, trial_id, StopRequest(said))
+        set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
+        record_abort(session, trial_id, StopRequest(words))
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(

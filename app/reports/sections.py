@@ -222,7 +222,7 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
         if (kind := _ENDINGS.get(trial.state)) is not None:
-            reason = trial.given_reason or _told(trial.state, trial.end) or "No reason was given."
+            reason = trial.given_reason or _end_beside(trial.state, trial.end) or "No reason was given."
             yield Anomaly(trial.number, kind, f"{reason}{_counting(trial)}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
@@ -238,8 +238,8 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             yield Anomaly(trial.number, "Glitch in the record", repaired)
         if trial.flight is not None and trial.flight.problem and (trial.given_reason or not kind):
             kind = _ENDINGS.get(trial.flight.state)
-            told = trial.flight.problem if kind is None else _told(trial.flight.state, trial.flight.end)
-            yield Anomaly(trial.number, kind or "Vehicle problem", told)
+            end = trial.flight.problem if kind is None else _end_beside(trial.flight.state, trial.flight.end)
+            yield Anomaly(trial.number, kind or "Vehicle problem", end)
 
 
 def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
@@ -253,7 +253,7 @@ def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
         )
 
 
-def _told(state: str, end: FlightEnd | None) -> str:
+def _end_beside(state: str, end: FlightEnd | None) -> str:
     """How a flight ended, beside the word for its state."""
     return "" if end is None else cause_text(end, "" if state == "aborted" else "aborted")
 

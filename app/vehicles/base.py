@@ -258,11 +258,11 @@ class ConnectedVehicle(Vehicle, Protocol):
         for gains that the vehicle cannot hold."""
         ...
 
-    def land(self, said: str) -> None:
+    def land(self, words: str) -> None:
         """Command the vehicle to land at once, in any state; with the words of who asked, if any."""
         ...
 
-    def motors_off(self, said: str) -> None:
+    def motors_off(self, words: str) -> None:
         """Stop the motors at once, at any height."""
         ...
 

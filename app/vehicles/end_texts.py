@@ -59,9 +59,9 @@ def joined(*parts: str) -> str:
     return " ".join(part for part in parts if part)
 
 
-def requested(command: str, said: str) -> str:
+def requested(command: str, words: str) -> str:
     """`Land was requested: too low.`; without words `Land was requested by the operator.`"""
-    return f"{command} was requested: {said}." if said else f"{command} was {REQUESTED_BY_OPERATOR}."
+    return f"{command} was requested: {words}." if words else f"{command} was {REQUESTED_BY_OPERATOR}."
 
 
 def unstaged_text(by: Requester) -> str:
@@ -71,14 +71,14 @@ def unstaged_text(by: Requester) -> str:
 
 def is_worded(request: StopRequest) -> bool:
     """Whether more is told about a request than who made it."""
-    return bool(request.said) or request.motors_off or request.by in _OF_PROGRAM
+    return bool(request.words) or request.motors_off or request.by in _OF_PROGRAM
 
 
 def request_text(request: StopRequest, verb: str = "aborted") -> str:
     """The words of a request that ended a flight; `aborted by the operator` without any."""
     if request.motors_off:
-        return requested("Motors off", request.said)
-    return _OF_PROGRAM.get(request.by) or request.said or f"{verb} {_ORIGINS[request.by]}".lstrip()
+        return requested("Motors off", request.words)
+    return _OF_PROGRAM.get(request.by) or request.words or f"{verb} {_ORIGINS[request.by]}".lstrip()
 
 
 def cause_text(end: FlightEnd, verb: str = "aborted") -> str:

@@ -71,7 +71,7 @@ class StopRequest:
     """Request to end a flight early, with the words of who asked, if any. `motors_off` stops the motors at once, at any
     height; otherwise the vehicle lands."""
 
-    said: str = ""
+    words: str = ""
     motors_off: bool = False
     by: Requester = Requester.OPERATOR
 

@@ -44,8 +44,8 @@ def upgrade() -> None:
         connection.execute(_flight.update().where(_flight.c.id == flight["id"]).values(end=end, stand_down=stand_down))
     for trial in trials.values():
         if trial["id"] in last:
-            told, trial["end"] = last[trial["id"]]
-            trial["reason"] = "" if trial["reason"] == told else trial["reason"]
+            text, trial["end"] = last[trial["id"]]
+            trial["reason"] = "" if trial["reason"] == text else trial["reason"]
         elif trial["ending"] is not None:
             give_end(trial)
         connection.execute(
@@ -66,10 +66,10 @@ def _end_of(flight: Any, trial: Any) -> Any:
 
 
 def downgrade() -> None:
-    """The ends are told in words again."""
+    """The ends become sentences again."""
     op.add_column("flight", sa.Column("problem", sa.String(), nullable=False, server_default=""))
     connection = op.get_bind()
-    words = {by: told for told, by in ORIGINS.items()}
+    words = {by: text for text, by in ORIGINS.items()}
     for flight in connection.execute(sa.select(_flight)).mappings().all():
         values = {"problem": tell(flight["end"]), "stand_down": words.get(flight["stand_down"], "")}
         connection.execute(_flight.update().where(_flight.c.id == flight["id"]).values(**values))

@@ -308,7 +308,7 @@ def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
     ordered_s = order_when(rig, line, "PARAM_SET", ordered)
     told = len(rig.heard)
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
-    forwarded = CommandForwarded(ordered.number, ordered.order, ordered.said, is_awaited=ordered is MOTORS_OFF)
+    forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, is_awaited=ordered is MOTORS_OFF)
     assert forwarded in line.said
     kind = "COMMAND_LONG" if ordered is MOTORS_OFF else "SCRIPT_ITEM"
     assert next(at_s for at_s, message in rig.heard[told:] if message.get_type() == kind) - ordered_s[0] < 0.5

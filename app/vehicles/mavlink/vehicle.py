@@ -339,15 +339,15 @@ class MavlinkVehicle:
         """Restore the safe gains and the other parameters of a trial; return the problem, or an empty string."""
         return self._gains.restore_or_explain() or self._parameters.restore()
 
-    def land(self, said: str) -> None:
+    def land(self, words: str) -> None:
         """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
-        self._requested, self.has_stopped = requested("Land", said), bool(self.has_stopped)
+        self._requested, self.has_stopped = requested("Land", words), bool(self.has_stopped)
         self._repeated = RepeatedCommand(self._radio, Action.LAND)
 
-    def motors_off(self, said: str) -> None:
+    def motors_off(self, words: str) -> None:
         """Stop the motors at once, at any height. A vehicle that may have been in the air, or that does not confirm it,
         is only observed from then on."""
-        self._requested, self.has_stopped = requested("Motors off", said), None
+        self._requested, self.has_stopped = requested("Motors off", words), None
         self._repeated = RepeatedCommand(self._radio, Action.KILL)
         if self._flight is None and not self._radio.is_disarmed:
             self._doubt_stop(_DROPPED)

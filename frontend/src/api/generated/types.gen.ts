@@ -3482,9 +3482,9 @@ export type StartOutput = {
  */
 export type StopRequest = {
     /**
-     * Said
+     * Words
      */
-    said?: string;
+    words?: string;
     /**
      * Motors Off
      */
