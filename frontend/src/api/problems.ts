@@ -157,17 +157,9 @@ function joined(one: string, other: string): string {
   return /[.!?]$/.test(one) ? `${one} ${other}` : `${one}; ${other}`;
 }
 
-/** Most important reasons first: a gain out of bounds, then harm in flight, then other limits. */
-const WEIGHT = [/^\S+ must be /, /stuck on the ground/, /wrap/, /ceiling|diverge|rise/];
-
-/** Reasons of a gain refusal, most important first. */
-export function reasonsByWeight(problem: Problem | null): string[] {
-  const rank = (reason: string): number => {
-    const found = WEIGHT.findIndex((words) => words.test(reason));
-    return found === -1 ? WEIGHT.length : found;
-  };
-  const reasons = new Set((problem?.problems ?? []).map(({ reason }) => reason));
-  return [...reasons].sort((one, other) => rank(one) - rank(other));
+/** Reasons of a gain refusal, the most important first, as the server lists them. */
+export function reasonsOf(problem: Problem | null): string[] {
+  return [...new Set((problem?.problems ?? []).map(({ reason }) => reason))];
 }
 
 /** Refused fields that are not among `fields`. */
