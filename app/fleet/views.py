@@ -164,13 +164,13 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
     found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
     shown = [line for line, _ in found[:limit]]
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
-    flights = repository.flights_by_id(session, [identity for why, identity in shown if why in of_flights])
-    acts = repository.acts_by_id(session, [identity for why, identity in shown if why not in of_flights])
+    flights = repository.flights_by_id(session, [identity for purpose, identity in shown if purpose in of_flights])
+    acts = repository.acts_by_id(session, [identity for purpose, identity in shown if purpose not in of_flights])
     items = []
-    for why, identity in shown:
-        if why == "flight":
+    for purpose, identity in shown:
+        if purpose == "flight":
             items.append(_of_flight(flights[identity]))
-        elif why == repository.RESTORE_AFTER_FLIGHT:
+        elif purpose == repository.RESTORE_AFTER_FLIGHT:
             items.append(_of_restoring(vehicle, flights[identity]))
         else:
             items.append(_of_act(acts[identity]))
