@@ -1,45 +1,27 @@
 """Ends of flights in the words of earlier versions, for the migration to revision 0010 and bundles before version 6.
 
-It is a record of what those versions wrote, and nothing else reads it. What is not recognised stays as it was.
+Nothing else reads words. What is not recognised stays as it was.
 """
 
 import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-_FAILURES: Final[Mapping[str, str]] = {
-    "No heartbeat was received; nothing was sent.": "F1",
-    "The vehicle did not confirm its gains; it was not armed.": "F2",
-    "The vehicle did not arm.": "F3",
-    "The vehicle would not arm.": "F3",
-    "The vehicle did not lift off.": "F4a",
-    "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe or flight plan "
-    "lands it.": "F5",
-    "The link was lost in the air; Land was repeated, the vehicle's own failsafe decides.": "F5",
-    "A safety limit was exceeded.": "F6",
+from app.vehicles.end_texts import FAILURE_TEXTS
+
+_FAILURES: Final[Mapping[str, str]] = {text: failure.value for failure, text in reversed(FAILURE_TEXTS.items())} | {
     "A safety limit was met.": "F6",
-    "The vehicle's position froze while packets still arrived.": "F9a",
-    "The vehicle's position stood still while it went on talking.": "F9a",
-    "Too many samples had to be dropped.": "F9b",
-    "Two sources of altitude disagree.": "F9c",
-    "The vehicle's position was lost.": "F9d",
-    "The vehicle's clock is slower than the clock speed in its settings.": "F9e",
-    "The vehicle's clock goes slower than its clock_speed says.": "F9e",
-    "A pilot took manual control; no further commands were sent.": "F10a",
-    "Somebody took the vehicle over by hand; it was left alone.": "F10a",
-    "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.": "F10b",
-    "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.": "F10b",
-    "The flight may have been interrupted.": "F10c",
     "A person may have flown the vehicle for a moment.": "F10c",
-    "The vehicle began to land by itself.": "F11",
-    "Two vehicles use the same system id. Both were commanded to land; their motors were not stopped.": "F12",
+    "Somebody took the vehicle over by hand; it was left alone.": "F10a",
+    "The link was lost in the air; Land was repeated, the vehicle's own failsafe decides.": "F5",
+    "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.": "F10b",
+    "The vehicle would not arm.": "F3",
+    "The vehicle's clock goes slower than its clock_speed says.": "F9e",
+    "The vehicle's position stood still while it went on talking.": "F9a",
     "Two vehicles speak under one system id; both were told to land, and no motors were stopped.": "F12",
-    "The vehicle fell.": "F13",
-    "The vehicle did not confirm a new set point.": "F14a",
-    "The steps were not flown.": "F14b",
-    "The set points paused.": "F14c",
 }
-"""How a reason begins, in 0.3.0 and in 0.2.0, and the number of its failure."""
+"""How a reason begins, and the number of its failure: in the words of 0.3.0, which are today's, and of 0.2.0. A
+sentence that is changed is added as it was."""
 ORIGINS: Final[Mapping[str, str]] = {
     "unstaged by the operator": "operator",
     "unstaged from another browser": "another browser",
@@ -113,20 +95,3 @@ def give_end(trial: dict[str, Any]) -> None:
         trial["end"], trial["reason"] = end, ""
     elif landed != "landed":
         trial["end"] = end | {"remarks": []}
-
-
-def tell(end: Mapping[str, Any] | None) -> str:
-    """Return an end in the words of 0.3.0, for a database that goes back to it."""
-    if end is None:
-        return ""
-    request = end["request"]
-    if request is not None and end["failure"] is None:
-        return next(words for words, by in ORIGINS.items() if by == request["by"])
-    first = next((begin for begin, failure in _FAILURES.items() if failure == end["failure"]), "")
-    if request is not None and request["by"] == "program stopped":
-        first = "Gainline was stopped"
-    elif request is not None and request["motors_off"]:
-        first = f"Motors off was requested{': ' if request['words'] else ' by the operator'}{request['words']}."
-    elif request is not None:
-        first = request["words"] or "aborted by the operator"
-    return " ".join(filter(None, (first, *end["remarks"])))

@@ -5,7 +5,7 @@ from typing import Any
 import sqlalchemy as sa
 from alembic import op
 
-from app.db.earlier_ends import ORIGINS, give_end, landing_of, read_end, tell
+from app.db.earlier_ends import ORIGINS, give_end, landing_of, read_end
 
 revision = "0010"
 down_revision = "0009"
@@ -66,18 +66,12 @@ def _end_of(flight: Any, trial: Any) -> Any:
 
 
 def downgrade() -> None:
-    """The ends become sentences again."""
+    """The older tables have no place for codes: of the ends their remarks are kept."""
     op.add_column("flight", sa.Column("problem", sa.String(), nullable=False, server_default=""))
     connection = op.get_bind()
-    words = {by: text for text, by in ORIGINS.items()}
-    for flight in connection.execute(sa.select(_flight)).mappings().all():
-        values = {"problem": tell(flight["end"]), "stand_down": words.get(flight["stand_down"], "")}
-        connection.execute(_flight.update().where(_flight.c.id == flight["id"]).values(**values))
-    for trial in connection.execute(sa.select(_trial)).mappings().all():
-        reason = trial["reason"] or ("" if trial["ending"] == "completed" else tell(trial["end"]))
-        settings = trial["settings"]
-        if trial["end"] is not None and trial["end"]["landed"] in {"fell", "unknown"} and trial["ending"]:
-            settings = {**settings, "landed": False}
-        connection.execute(_trial.update().where(_trial.c.id == trial["id"]).values(reason=reason, settings=settings))
+    for table, name in ((_flight, "problem"), (_trial, "reason")):
+        for row in connection.execute(sa.select(table).where(table.c.end.is_not(None))).mappings().all():
+            values = {name: row.get("reason") or " ".join(row["end"]["remarks"])}
+            connection.execute(table.update().where(table.c.id == row["id"]).values(**values))
     for table in ("trial", "flight"):
         op.drop_column(table, "end")

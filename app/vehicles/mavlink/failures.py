@@ -39,16 +39,10 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.NOT_ARMED: Response("arming refused, or not armed within 2 s", "disarm", "refused"),
         Failure.NO_LIFT_OFF: Response(
-            "still less than 0.15 m above the ground when the lift-off time limit ends",
-            "disarm",
-            "aborted",
+            "still less than 0.15 m above the ground when the lift-off time limit ends", "disarm", "aborted"
         ),
         Failure.TAKE_OFF_REFUSED: Response("takeoff refused", "disarm", "refused"),
-        Failure.LINK: Response(
-            "no packet for 1 s, or three heartbeats missed",
-            "repeat land",
-            "invalid",
-        ),
+        Failure.LINK: Response("no packet for 1 s, or three heartbeats missed", "repeat land", "invalid"),
         Failure.ENVELOPE: Response(
             "a limit of altitude, position, speed, lean or oscillation, or the vehicle's own fence",
             "land, gains first",
@@ -63,9 +57,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "invalid",
         ),
         Failure.GLITCHES: Response(
-            "more than three lone samples that jump by 0.3 m or are faster than 6 m/s",
-            "note",
-            "invalid",
+            "more than three lone samples that jump by 0.3 m or are faster than 6 m/s", "note", "invalid"
         ),
         Failure.DISAGREEMENT: Response("two sources more than 0.3 m apart for 0.3 s", "land", "invalid"),
         Failure.LOST_POSITION: Response(
@@ -76,15 +68,9 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "invalid",
         ),
         Failure.SLOW_CLOCK: Response(
-            "the record incomplete 3 s after its end, by the ground's clock",
-            "land",
-            "invalid",
+            "the record incomplete 3 s after its end, by the ground's clock", "land", "invalid"
         ),
-        Failure.TAKEN_OVER: Response(
-            "a manual mode, in heartbeats that agree",
-            "cease",
-            "quarantine",
-        ),
+        Failure.TAKEN_OVER: Response("a manual mode, in heartbeats that agree", "cease", "quarantine"),
         Failure.UNEXPECTED: Response(
             "another mode or block, a disarming or a reboot that was not commanded, in messages that agree, also when "
             "it is found during the landing",
@@ -99,34 +85,24 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "invalid",
         ),
         Failure.OWN_LANDING: Response(
-            "a landing that was not commanded: its own failsafe, or an exception of its flight plan",
-            "land",
-            "invalid",
+            "a landing that was not commanded: its own failsafe, or an exception of its flight plan", "land", "invalid"
         ),
         Failure.DUPLICATE: Response(
             "repeated sequence numbers with different contents, or two alternating clocks, under one system id",
             "land",
             "quarantine",
         ),
-        Failure.FALL: Response(
-            "ground contact at more than 2 m/s",
-            "note",
-            "quarantine",
-        ),
+        Failure.FALL: Response("ground contact at more than 2 m/s", "note", "quarantine"),
         Failure.SET_POINT: Response(
             "a new set point refused, unconfirmed after three attempts, 0.5 s apart, or more than 1.5 s late",
             "land",
             "invalid",
         ),
         Failure.NOT_SETTLED: Response(
-            "not at rest within 0.2 m in the 2 s before the first step",
-            "land, gains first",
-            "invalid",
+            "not at rest within 0.2 m in the 2 s before the first step", "land, gains first", "invalid"
         ),
         Failure.PAUSED: Response(
-            "no set point sent for 0.5 s to an autopilot that must receive them continuously",
-            "land",
-            "invalid",
+            "no set point sent for 0.5 s to an autopilot that must receive them continuously", "land", "invalid"
         ),
     }
 )

@@ -16,7 +16,7 @@ from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import Samples, Trajectory
 from app.vehicles.base import Ending, OptionValue
-from app.vehicles.flight_end import FlightEnd, GainsLeft, Landing
+from app.vehicles.flight_end import FlightEnd, GainsLeft
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.trial_machine import Trial
@@ -189,11 +189,6 @@ def _with_references(samples: Sequence[RecordSample], begin_s: float) -> Sequenc
         else replace(sample, reference_m=reference_m(sample.position.time_boot_s, sample.position.altitude_m))
         for sample in samples
     ]
-
-
-def has_flown(trial: Trial) -> bool:
-    """Whether something was flown, or may have been."""
-    return trial.contact is not Landing.STAYED
 
 
 def ending_of(trial: Trial) -> Ending:

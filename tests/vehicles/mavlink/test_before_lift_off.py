@@ -14,8 +14,8 @@ from app.vehicles.mavlink.events import (
     StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.records import has_flown
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.records import end_of
+from app.vehicles.mavlink.trial_reactions import State, Trial
 from tests.vehicles.flying import TUNED, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -23,6 +23,10 @@ from tests.vehicles.mavlink.test_vehicle import MILDER, ORDER
 from tests.vehicles.mavlink.walking import GROUND_M, STEP_S, TrialDriver
 
 Walk = Callable[[TrialDriver], object]
+
+
+def has_flown(trial: Trial) -> bool:
+    return end_of(trial).landed is not Landing.STAYED
 
 
 def aborted(walk: TrialDriver) -> TrialDriver:
