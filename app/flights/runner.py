@@ -34,6 +34,7 @@ from app.flights.record_spool import Spool
 from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
+from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind
 
 STAGED_FOR_S: Final = 600.0
@@ -230,7 +231,7 @@ class FlightRunner:
 
         Only the end of the worker leaves a flight in state running.
         """
-        _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
+        _log.info("flight over", recorded=ended.record is not None, end=end_text(ended.ended), concern=ended.concern)
         flight_id = request.flight_id
         if ended.record is not None:
             self._spool_record(request, ended.record)

@@ -162,7 +162,7 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
     assert seen == [True]
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["flight"]["state"]) == ("planned", "cancelled")
-    assert ended["flight"]["problem"] == "changed my mind"
+    assert (ended["flight"]["end"]["failure"], ended["flight"]["end"]["request"]["words"]) == ("F8", "changed my mind")
     assert ended["read_back"] is None, "nothing was sent to the vehicle"
 
 
