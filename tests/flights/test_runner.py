@@ -21,7 +21,8 @@ from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
 from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
-from app.vehicles.flight_end import StopRequest
+from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import StopRequest, withdrawn_by
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.campaigns.trials.states import make_vehicle_real
 from tests.clocks import SimulatedClock
@@ -140,7 +141,7 @@ def test_an_abort_while_the_lift_off_is_stored_is_no_flight(
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["flown_at"], ended["record"]) == ("planned", None, None)
-    assert ended["reason"] == ended["flight"]["problem"] == "aborted before lift-off: somebody walked in"
+    assert ended["reason"] == ended["flight"]["problem"] == end_text(withdrawn_by(StopRequest("somebody walked in")))
     assert (ended["flight"]["state"], ended["abort_cause"]) == ("cancelled", None)
     assert [said.phase for said in field.heard if isinstance(said, FlightPhase)] == ["staging", "flying", "ended"]
     assert list((settings.data_dir / "spool").iterdir()) == []
@@ -303,7 +304,7 @@ class Refusing:
 
     def take_off(self) -> None: ...
     def cancel_take_off(self) -> None: ...
-    def cancel_flight(self, trial_id: int, reason: str) -> None: ...
+    def cancel_flight(self, trial_id: int, request: StopRequest) -> None: ...
     def close(self) -> None: ...
 
 

@@ -113,7 +113,7 @@ def test_who_ended_a_flight_follows_from_no_words(
     record = create_record(ending="aborted", until_s=4.0)
     land(database, lift_off(database), replace(record, end=end))
     found = get(client, f"/api/trials/{trial['id']}")
-    assert (found["abort_cause"], found["reason"]) == (cause, "A safety limit was exceeded.")
+    assert (found["abort_cause"], found["reason"]) == (cause, FAILURE_TEXTS[Failure.ENVELOPE])
 
 
 def test_an_abort_at_a_limit_always_counts_against_the_gains(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.vehicles.end_texts import FAILURE_TEXTS
+from app.vehicles.end_texts import FAILURE_TEXTS, request_text
 from app.vehicles.flight_end import GainsLeft, StopRequest
 from app.vehicles.mavlink.events import (
     Action,
@@ -42,8 +42,11 @@ COPTER = replace(
 )
 
 
-def slide(walk: TrialDriver, reason: str = "it flies towards people") -> TrialDriver:
-    return walk.give(StopRequested(StopRequest(reason, motors_off=True), walk.now_s))
+SLIDE = StopRequest("it flies towards people", motors_off=True)
+
+
+def slide(walk: TrialDriver) -> TrialDriver:
+    return walk.give(StopRequested(SLIDE, walk.now_s))
 
 
 @pytest.mark.parametrize("state", STAGES)
@@ -57,7 +60,7 @@ def test_motors_off_is_sent_at_once_in_every_state_and_aborts_a_trial_that_had_n
     assert walk.state is (State.RESTORE if state is State.RESTORE else State.DISARM)
     expected = failed if failed[0] is not None else (Failure.OPERATOR, "aborted")
     assert (walk.trial.failure, walk.trial.outcome) == expected
-    assert walk.trial.why.endswith("Motors off was requested: it flies towards people.")
+    assert walk.trial.request == SLIDE or walk.trial.remarks[-1] == request_text(SLIDE)
 
 
 def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_says_so() -> None:
@@ -93,7 +96,7 @@ def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -
     for _ in range(55):
         slide(walk).pass_s(STEP_S)
     assert len(walk.when(Action.KILL)) == 2
-    assert walk.trial.why == "too high Motors off was requested: it flies towards people."
+    assert (walk.trial.request, walk.trial.remarks) == (StopRequest("too high"), (request_text(SLIDE),))
 
 
 @pytest.mark.parametrize("motors_off", [False, True])
