@@ -1,4 +1,7 @@
-"""How a flight ended, in codes and names instead of sentences."""
+"""How a flight ended, in codes and names instead of sentences.
+
+The sentences of before are in the application, because bundles and spooled records have them too; it only adds to them.
+"""
 
 from typing import Any
 

@@ -107,7 +107,7 @@ test("a refusal of a form leaves a field that is edited, and ends with the last 
 });
 
 test("a refusal that names no field stays", () => {
-  const error = new ApiError(problemFrom(409, { title: "Conflict" }));
+  const error = new ApiError(problemFrom(409, { type: "urn:gainline:conflict", title: "Conflict" }));
   expect(standingProblem(error, { name: "a" }, { name: "b" })?.title).toBe("Not possible now");
 });
 
