@@ -10,7 +10,7 @@ from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
 from app.simdrone.copter_parameters import Parameters
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, VehicleError
-from app.vehicles.flight_end import Failure, StopRequest
+from app.vehicles.flight_end import Failure, Landing, StopRequest
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.registry import open_vehicle
@@ -115,7 +115,7 @@ def test_motors_off_during_a_step_stops_it_at_once() -> None:
         stop = lambda: decide() if watcher.samples else None  # noqa: E731
         record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=stop)
         assert waypoints(rig) == [3.0, 2.0]
-    assert (record.ending, record.settings["landed"]) == ("aborted", False)
+    assert (record.ending, record.end.landed) == ("aborted", Landing.FELL)
     assert (record.end.failure, record.end.request) == (Failure.OPERATOR, StopRequest("it burns", motors_off=True))
 
 
