@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from app.vehicles.end_texts import FAILURE_TEXTS
 
-_FAILURES: Final[Mapping[str, str]] = {text: failure.value for failure, text in reversed(FAILURE_TEXTS.items())} | {
+_FAILURES: Final[Mapping[str, str]] = {
+    **{text: failure.value for failure, text in reversed([*FAILURE_TEXTS.items()])},
     "A safety limit was met.": "F6",
     "A person may have flown the vehicle for a moment.": "F10c",
     "Somebody took the vehicle over by hand; it was left alone.": "F10a",
@@ -20,8 +21,8 @@ _FAILURES: Final[Mapping[str, str]] = {text: failure.value for failure, text in 
     "The vehicle's position stood still while it went on talking.": "F9a",
     "Two vehicles speak under one system id; both were told to land, and no motors were stopped.": "F12",
 }
-"""How a reason begins, and the number of its failure: in the words of 0.3.0, which are today's, and of 0.2.0. A
-sentence that is changed is added as it was."""
+"""How a reason begins, and the number of its failure, the first if several have the sentence: in the words of 0.3.0,
+which are today's, and of 0.2.0. A sentence that is changed is added as it was."""
 ORIGINS: Final[Mapping[str, str]] = {
     "unstaged by the operator": "operator",
     "unstaged from another browser": "another browser",

@@ -35,8 +35,8 @@ _flight = sa.table(
 
 def upgrade() -> None:
     """What is recognised in the words of before becomes codes; the rest stays a remark, or the trial's reason."""
-    for table in ("trial", "flight"):
-        op.add_column(table, sa.Column("end", _JSON, nullable=True))
+    op.add_column("trial", sa.Column("end", _JSON, nullable=True))
+    op.add_column("flight", sa.Column("end", _JSON, nullable=True))
     connection = op.get_bind()
     trials = {row["id"]: dict(row) for row in connection.execute(sa.select(_trial)).mappings()}
     last: dict[int, tuple[str, Any]] = {}
@@ -76,5 +76,5 @@ def downgrade() -> None:
         for row in connection.execute(sa.select(table).where(table.c.end.is_not(None))).mappings().all():
             values = {name: row.get("reason") or " ".join(row["end"]["remarks"])}
             connection.execute(table.update().where(table.c.id == row["id"]).values(**values))
-    for table in ("trial", "flight"):
-        op.drop_column(table, "end")
+    op.drop_column("trial", "end")
+    op.drop_column("flight", "end")

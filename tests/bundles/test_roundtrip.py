@@ -364,8 +364,8 @@ def test_how_a_flight_ended_is_recognised_in_the_words_of_earlier_bundles(
 
     def arrived(reason: str) -> Json:
         brought_in = brought(there, with_reasons(earlier, {number: reason}))
-        trials: list[Json] = get(there, f"/api/campaigns/{brought_in['id']}/trials")["items"]
-        return trials[number - 1]
+        found: Json = get(there, f"/api/campaigns/{brought_in['id']}/trials")["items"][number - 1]
+        return found
 
     assert arrived("enough")["end"] == trial["end"]
     limit = arrived("A safety limit was exceeded. It rose to 4.6 m.")
