@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
+from app.vehicles.flight_end import StopRequest
+
 DISARMING: Final = "command 400"
 """`CommandReply.to` of a reply to arming and disarming."""
 
@@ -245,16 +247,8 @@ class PacketReceived:
 
 
 @dataclass(frozen=True, slots=True)
-class AbortRequested:
-    reason: str
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class MotorsOffRequested:
-    """Request of a person to stop the motors at any height."""
-
-    reason: str
+class StopRequested:
+    request: StopRequest
     now_s: float
 
 
@@ -313,8 +307,7 @@ class GainsRestored:
 Event = (
     Tick
     | PacketReceived
-    | AbortRequested
-    | MotorsOffRequested
+    | StopRequested
     | SecondaryAltitudeReceived
     | DuplicateVehicleDetected
     | ActionDone

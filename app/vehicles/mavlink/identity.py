@@ -4,8 +4,9 @@ from dataclasses import replace
 from typing import Final
 
 from app.vehicles.base import Identity, VehicleError
+from app.vehicles.end_texts import FAILURE_TEXTS
 from app.vehicles.mavlink.events import Heartbeat, Version
-from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.radio import AutopilotLink
@@ -107,7 +108,7 @@ class VehicleIdentity:
                 "changed. Otherwise check that no other vehicle sends to this address.",
             )
         raise VehicleError(
-            f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title}.",
+            f"{FAILURE_TEXTS[Failure.NO_HEARTBEAT]} Waited {within_s:g} s at {address} for {radio.profile.title}.",
             hint="Check that the vehicle is on, that it sends to this computer's port, and that the right autopilot is "
             "selected.",
         )

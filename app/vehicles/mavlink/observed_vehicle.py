@@ -7,7 +7,8 @@ from typing import Final
 
 from app.core.clock import Clock
 from app.core.policy import Gains
-from app.vehicles.base import Identity, VehicleError, motors_off_requested, requested
+from app.vehicles.base import Identity, VehicleError
+from app.vehicles.end_texts import requested
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preparation
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
@@ -185,15 +186,15 @@ class ObservedVehicle:
 
     # ---- commands of a person
 
-    def land(self, reason: str) -> None:
+    def land(self, words: str) -> None:
         """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
-        self._quarantine.requested, self.has_stopped = requested("Land", reason), bool(self.has_stopped)
+        self._quarantine.requested, self.has_stopped = requested("Land", words), bool(self.has_stopped)
         self._repeated = RepeatedCommand(self._radio, Action.LAND)
 
-    def motors_off(self, reason: str) -> None:
+    def motors_off(self, words: str) -> None:
         """Stop the motors at once, at any height. A vehicle that may have been in the air, or that does not confirm it,
         is only observed from then on."""
-        self._quarantine.requested, self.has_stopped = motors_off_requested(reason), None
+        self._quarantine.requested, self.has_stopped = requested("Motors off", words), None
         self._repeated = RepeatedCommand(self._radio, Action.KILL)
         if not self._is_flying and not self._radio.is_disarmed:
             self._doubt_stop(_DROPPED)

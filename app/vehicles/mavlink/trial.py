@@ -6,16 +6,15 @@ from typing import Final
 
 import numpy as np
 
-from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
+from app.vehicles.base import Sample, ShouldStop, VehicleError
+from app.vehicles.flight_end import Requester, StopRequest
 from app.vehicles.mavlink.events import (
-    AbortRequested,
     Action,
     ActionRefused,
     Command,
     DuplicateVehicleDetected,
     Event,
     GainsRestored,
-    MotorsOffRequested,
     PacketReceived,
     PerformAction,
     Position,
@@ -25,6 +24,7 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
     SendGain,
     SetPointsPaused,
+    StopRequested,
     Tick,
     WithdrawSetPoint,
 )
@@ -184,8 +184,7 @@ class TrialRunner:
         if self._trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
             self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
-            wanted = MotorsOffRequested if stop.motors_off else AbortRequested
-            self._advance(wanted(stop.reason, self._radio.clock.now_s()))
+            self._advance(StopRequested(stop, self._radio.clock.now_s()))
         now_s = self._radio.clock.now_s()
         self._listens_first = now_s - self._listened_s > STALL_S and not self._listens_first
         if not self._listens_first:
@@ -197,7 +196,7 @@ class TrialRunner:
         stop = self._call_should_stop()
         if self._error is None or (stop is not None and stop.motors_off):
             return stop
-        return StopRequest(_describe_error(self._error))
+        return StopRequest(_describe_error(self._error), by=Requester.INTERNAL_ERROR)
 
     def _call_should_stop(self) -> StopRequest | None:
         try:

@@ -136,8 +136,8 @@ def disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     trial = _answered(_doubting(trial), event)
     if _is_stopped(trial, event):
-        confirmed = " The vehicle confirmed that its motors have stopped." if trial.stopped else ""
-        trial = replace(trial, why=trial.why + confirmed, contact=find_contact(trial, now_s))
+        confirmed = ("The vehicle confirmed that its motors have stopped.",) if trial.stopped else ()
+        trial = replace(trial, remarks=(*trial.remarks, *confirmed), contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     watch, plan = trial.watch, trial.plan
     stands = trial.takeoff is None and watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)

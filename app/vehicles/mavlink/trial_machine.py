@@ -6,22 +6,22 @@ It depends on no autopilot and no clock: events carry their time, and commands a
 import dataclasses
 from typing import Final
 
+from app.vehicles.flight_end import Landing
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
-    AbortRequested,
     Action,
     Command,
     DuplicateVehicleDetected,
     Event,
     Measurement,
-    MotorsOffRequested,
     PacketReceived,
     Parameter,
     PerformAction,
     RecordSample,
     RequestGain,
     SecondaryAltitudeReceived,
+    StopRequested,
 )
 from app.vehicles.mavlink.failures import REPEAT_S, Failure, Finding
 from app.vehicles.mavlink.monitors.positions import DRIFT_M
@@ -161,7 +161,7 @@ def _with_fall(trial: Trial, now_s: float) -> Trial:
     if trial.stopped or trial.takeoff is None or trial.fell_s is not None:
         return trial
     fall = trial.watch.positions.find_fall(trial.plan.limits, trial.plan.ground_m)
-    return trial if fall is None else replace(note(trial, fall), contact="fell", fell_s=now_s)
+    return trial if fall is None else replace(note(trial, fall), contact=Landing.FELL, fell_s=now_s)
 
 
 def _with_disarming(trial: Trial) -> Trial:
@@ -201,9 +201,9 @@ def _with_jump(trial: Trial) -> Trial:
 
 
 def _react(trial: Trial, event: Event) -> Step:
-    if isinstance(event, MotorsOffRequested):
-        return stop_motors(trial, event.reason, event.now_s)
-    if isinstance(event, AbortRequested) and trial.state in COMMANDED:
+    if isinstance(event, StopRequested) and event.request.motors_off:
+        return stop_motors(trial, event.request, event.now_s)
+    if isinstance(event, StopRequested) and trial.state in COMMANDED:
         trial = measure_ground(trial, event.now_s) if trial.state is State.ARM else trial
-        return fail(trial, Finding(Failure.OPERATOR, event.reason), event.now_s)
+        return fail(trial, Finding(Failure.OPERATOR, request=event.request), event.now_s)
     return HANDLERS[trial.state](trial, event)

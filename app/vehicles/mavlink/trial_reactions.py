@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
-from app.vehicles.base import motors_off_requested
+from app.vehicles.end_texts import request_text
+from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Action,
@@ -20,7 +21,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import GAIN_FAILURES, GROUND_M, RESPONSES, Failure, Finding, Reaction
 from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_state import TRANSITIONS, Contact, SafeGainsSent, State, Step, Trial
+from app.vehicles.mavlink.trial_state import TRANSITIONS, SafeGainsSent, State, Step, Trial
 
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
@@ -68,7 +69,7 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
         return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else _abort_landing(trial, now_s)
     reaction = RESPONSES[finding.failure].reaction
     if reaction == "cease":
-        return quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
+        return quarantine(trial, finding.why, now_s)
     if trial.state in (State.ABORT_LAND, State.LINK_LOST):
         return (
             abort_with_safe_gains(trial, now_s)
@@ -100,7 +101,8 @@ def note(trial: Trial, finding: Finding) -> Trial:
         trial = replace(trial, doubt=finding.why)
     if trial.failure is not None:
         return trial
-    return replace(trial, failure=finding.failure, why=finding.why)
+    remarks = (finding.why,) if finding.why else ()
+    return replace(trial, failure=finding.failure, request=finding.request, remarks=remarks)
 
 
 def note_cause(trial: Trial, finding: Finding) -> Trial:
@@ -157,15 +159,18 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     return "" if watch.climb.lifted and watch.climb.unseen_m is None else "its descent was not observed"
 
 
-def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
+def stop_motors(trial: Trial, request: StopRequest, now_s: float) -> Step:
     """Stop the motors at once, at any height; disarm repeats the command. A trial that has not failed is aborted, and a
     vehicle that may have fallen is quarantined at its end."""
     if trial.stopped:
         return trial, ()
-    why, failure = joined(trial.why, motors_off_requested(reason)), trial.failure or Failure.OPERATOR
     drop = _find_drop(trial, now_s)
-    doubt, contact = trial.doubt or drop, "fell" if drop else trial.contact
-    trial = replace(trial, failure=failure, why=why, doubt=doubt, contact=contact, stopped=True, answered=False)
+    if trial.failure is None:
+        trial = note(trial, Finding(Failure.OPERATOR, request=request))
+    else:
+        trial = replace(trial, remarks=(*trial.remarks, request_text(request)))
+    doubt, contact = trial.doubt or drop, Landing.FELL if drop else trial.contact
+    trial = replace(trial, doubt=doubt, contact=contact, stopped=True, answered=False)
     if trial.safe_gains is not None:
         trial = replace(trial, safe_gains=replace(trial.safe_gains, awaited=None, unsent=()))
     if trial.state not in (State.DISARM, State.RESTORE):
@@ -189,11 +194,11 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     return "The vehicle was not known to be on the ground: inspect it before it flies again."
 
 
-def find_contact(trial: Trial, now_s: float) -> Contact:
+def find_contact(trial: Trial, now_s: float) -> Landing:
     """Return the contact with the ground of a vehicle whose motors have stopped now."""
-    if trial.contact == "fell":
-        return "fell"
-    return "stayed" if _has_stayed_down(trial, now_s) else "landed"
+    if trial.contact is Landing.FELL:
+        return Landing.FELL
+    return Landing.STAYED if _has_stayed_down(trial, now_s) else Landing.LANDED
 
 
 def _has_stayed_down(trial: Trial, now_s: float) -> bool:
@@ -211,12 +216,8 @@ def _has_stayed_down(trial: Trial, now_s: float) -> bool:
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:
-    parts = (trial.why, *(part for part in dict.fromkeys((trial.doubt, why)) if part not in trial.why))
-    return replace(enter(trial, State.QUARANTINE, now_s), why=joined(*parts)), ()
-
-
-def joined(*parts: str) -> str:
-    return " ".join(part for part in parts if part)
+    remarks = tuple(dict.fromkeys(filter(None, (*trial.remarks, trial.doubt, why))))
+    return replace(enter(trial, State.QUARANTINE, now_s), remarks=remarks), ()
 
 
 def send_gains(trial: Trial, sent: SafeGainsSent, event: Event) -> Step:

@@ -4,11 +4,13 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Literal
+from typing import Final
 
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import RECORDED_BEYOND_S
+from app.vehicles.end_texts import joined, request_text
+from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink.events import Command, ModeParameter, Position, Setting
 from app.vehicles.mavlink.failures import RESPONSES, Failure, Limits, Outcome
 from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
@@ -146,11 +148,6 @@ class Plan:
         return moved.with_set_point(self.limits.set_point_m + moved.datum_m - self.datum_m)
 
 
-Contact = Literal["unknown", "stayed", "landed", "fell"]
-"""Contact with the ground once the motors have stopped. stayed: it has never left the ground. fell: its motors may have
-been stopped in the air, or it hit the ground hard. unknown: its motors were not seen to stop."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class TakeoffCommand:
     """The takeoff command of a trial: its time, the vehicle's own time of the last sample before it (`boot_s`), and its
@@ -179,7 +176,8 @@ class SafeGainsSent:
 class Trial:
     """State of a trial.
 
-    `failure` is the first failure, `doubt` the reason why the vehicle will be quarantined at the end, however it lands.
+    `failure` is the first failure; `request` ended the trial before any failure of its own;
+    `doubt` the reason why the vehicle will be quarantined at the end, however it lands.
     `ground_samples` are its positions between arming and the takeoff command, `ground_shift_m` is the increase of its
     altitude on the ground in that time. `resting_since_s`: since when it is at rest; `repeated_s`: when Land or motors
     off was commanded last. `stopped`: a person has requested motors off; `answered`: the vehicle has replied to the
@@ -194,7 +192,8 @@ class Trial:
     settings: SettingMonitor
     set_points: SetPointMonitor
     failure: Failure | None = None
-    why: str = ""
+    request: StopRequest | None = None
+    remarks: tuple[str, ...] = ()
     doubt: str = ""
     arm_sent_s: float | None = None
     armed_s: float | None = None
@@ -208,11 +207,16 @@ class Trial:
     answered: bool = False
     disarmed_m: float = 0.0
     fell_s: float | None = None
-    contact: Contact = "unknown"
+    contact: Landing = Landing.UNKNOWN
 
     @property
     def is_over(self) -> bool:
         return self.state in OVER
+
+    @property
+    def why(self) -> str:
+        """Why it failed, for people."""
+        return joined("" if self.request is None else request_text(self.request), *self.remarks)
 
     @property
     def commanded_boot_s(self) -> float | None:

@@ -8,6 +8,8 @@ from typing import Final
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
+from app.vehicles.end_texts import cause_text
+from app.vehicles.flight_end import FlightEnd, Landing, withdrawn_by
 from app.vehicles.mavlink import flight_preparation, ground_observation, preflight, preparation, records
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.connection import VehicleConnection
@@ -144,7 +146,7 @@ class MavlinkVehicle(VehicleConnection):
         if stop is not None:
             self.has_stopped = self._radio.is_disarmed
             self._restore_or_quarantine()
-            return self._not_begun(ground, stop.reason, has_flown=False)
+            return self._not_begun(ground, withdrawn_by(stop))
         flown = self._fly(ground, order, reference, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
@@ -240,11 +242,12 @@ class MavlinkVehicle(VehicleConnection):
         """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
         aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
-        reason = records.reason_of(trial)
         if start_s is None and trial.failure is Failure.OPERATOR:
-            return self._not_begun(ground, reason, has_flown=trial.watch.climb.lifted)
+            landed = trial.contact if trial.watch.climb.lifted else Landing.STAYED
+            return self._not_begun(ground, replace(records.end_of(trial), landed=landed))
         if start_s is None:
-            refusal = VehicleError(reason, hint="Inspect the vehicle, correct this, then fly again.")
+            why = cause_text(records.end_of(trial))
+            refusal = VehicleError(why, hint="Inspect the vehicle, correct this, then fly again.")
             refusal.not_flown = True
             raise refusal
         plan = trial.plan
@@ -268,21 +271,12 @@ class MavlinkVehicle(VehicleConnection):
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
-            failure="" if trial.failure is None else trial.failure.value,
-            reason=" ".join(part for part in (reason, _LAND_WAS_REPEATED if lands else "", both.remark) if part),
-            has_flown=records.has_flown(trial),
-            settings={**self._options, **self._loop, **both.settings, **records.contact_of(trial)},
+            end=records.end_of(trial, _LAND_WAS_REPEATED if lands else "", both.remark),
+            settings={**self._options, **self._loop, **both.settings},
         )
 
-    def _not_begun(self, ground: Ground, reason: str, *, has_flown: bool) -> FlightRecord:
+    def _not_begun(self, ground: Ground, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
-        return FlightRecord(
-            trajectory=trajectory,
-            ending="aborted",
-            failure=Failure.OPERATOR.value,
-            reason=reason,
-            has_flown=has_flown,
-            settings=self._options,
-        )
+        return FlightRecord(trajectory=trajectory, ending="aborted", end=end, settings=self._options)

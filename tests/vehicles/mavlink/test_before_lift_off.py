@@ -4,18 +4,18 @@ from collections.abc import Callable
 
 import pytest
 
-from app.vehicles.base import FlightRecord, StopRequest
+from app.vehicles.base import FlightRecord
+from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink.events import (
-    AbortRequested,
     Action,
     ActionRefused,
-    MotorsOffRequested,
     Position,
     SecondaryAltitudeReceived,
+    StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.records import contact_of, has_flown
-from app.vehicles.mavlink.trial_state import State
+from app.vehicles.mavlink.records import end_of
+from app.vehicles.mavlink.trial_state import State, Trial
 from tests.vehicles.flying import TUNED, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -25,12 +25,16 @@ from tests.vehicles.mavlink.walking import GROUND_M, STEP_S, TrialDriver
 Walk = Callable[[TrialDriver], object]
 
 
+def has_flown(trial: Trial) -> bool:
+    return end_of(trial).landed is not Landing.STAYED
+
+
 def aborted(walk: TrialDriver) -> TrialDriver:
-    return walk.give(AbortRequested("the operator pressed Abort", walk.now_s))
+    return walk.give(StopRequested(StopRequest("the operator pressed Abort"), walk.now_s))
 
 
 def stopped_by_hand(walk: TrialDriver) -> TrialDriver:
-    return walk.give(MotorsOffRequested("it tips over", walk.now_s))
+    return walk.give(StopRequested(StopRequest("it tips over", motors_off=True), walk.now_s))
 
 
 def over(walk: TrialDriver) -> TrialDriver:
@@ -64,7 +68,7 @@ def test_a_refused_takeoff_is_no_flight() -> None:
     walk = over(refused(taking_off()))
     assert (walk.state, walk.trial.failure) == (State.IDLE, Failure.TAKE_OFF_REFUSED)
     assert walk.actions[-1] is Action.MOTORS_OFF
-    assert (walk.trial.contact, has_flown(walk.trial), contact_of(walk.trial)) == ("stayed", False, {})
+    assert (walk.trial.contact, has_flown(walk.trial)) == (Landing.STAYED, False)
 
 
 def test_a_packet_out_of_order_changes_nothing() -> None:
@@ -183,21 +187,21 @@ def test_a_vehicle_that_changed_its_state_by_itself_has_flown() -> None:
 
 def test_a_record_states_that_the_vehicle_fell() -> None:
     walk = TrialDriver().lift_off()
-    assert contact_of(over(aborted(walk).touch_down()).trial) == {}
+    assert over(aborted(walk).touch_down()).trial.contact is Landing.LANDED
     walk = TrialDriver().lift_off()
-    walk = walk.give(MotorsOffRequested("people below", walk.now_s)).disarm().restore()
-    assert (walk.trial.contact, contact_of(walk.trial)) == ("fell", {"landed": False})
+    walk = walk.give(StopRequested(StopRequest("people below", motors_off=True), walk.now_s)).disarm().restore()
+    assert walk.trial.contact is Landing.FELL
 
 
 def test_a_record_states_that_no_landing_was_observed() -> None:
     walk = aborted(TrialDriver().lift_off()).pass_s(41.0)
-    assert (walk.state, contact_of(walk.trial)) == (State.QUARANTINE, {"landed": False})
+    assert (walk.state, walk.trial.contact) == (State.QUARANTINE, Landing.UNKNOWN)
 
 
 def test_motors_off_on_the_ground_after_a_landing_is_no_fall() -> None:
     walk = aborted(TrialDriver().lift_off()).touch_down()
-    walk = walk.give(MotorsOffRequested("to be sure", walk.now_s)).disarm().restore()
-    assert (walk.trial.contact, contact_of(walk.trial)) == ("landed", {})
+    walk = walk.give(StopRequested(StopRequest("to be sure", motors_off=True), walk.now_s)).disarm().restore()
+    assert walk.trial.contact is Landing.LANDED
 
 
 # ---- the simulated drone

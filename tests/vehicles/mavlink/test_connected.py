@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

@@ -15,7 +15,8 @@ from app.simdrone import faults
 from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
 from app.simdrone.px4 import Px4
-from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY, ArmingChecks
 from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.events import VehicleEvent

@@ -7,7 +7,8 @@ from typing import Final
 
 import pytest
 
-from app.vehicles.base import FlightOptions, Identity, StopRequest
+from app.vehicles.base import FlightOptions, Identity
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.events import Action
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Target

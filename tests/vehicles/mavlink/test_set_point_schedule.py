@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 from app.core.models.set_points import SetPoints
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.events import (
     Action,
     ActionDone,
@@ -13,9 +14,9 @@ from app.vehicles.mavlink.events import (
     BlockEntered,
     Command,
     Heartbeat,
-    MotorsOffRequested,
     PerformAction,
     SetPointsPaused,
+    StopRequested,
     TargetAltitude,
     WithdrawSetPoint,
 )
@@ -164,7 +165,7 @@ def land_by_itself(walk: TrialDriver) -> None:
 
 
 def stop_the_motors(walk: TrialDriver) -> None:
-    walk.give(MotorsOffRequested("it burns", walk.now_s))
+    walk.give(StopRequested(StopRequest("it burns", motors_off=True), walk.now_s))
 
 
 FAILURES: list[tuple[Callable[[TrialDriver], None], State, Failure]] = [

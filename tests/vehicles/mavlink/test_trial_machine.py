@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     DISARMING,
-    AbortRequested,
     Action,
     ActionDone,
     ActionRefused,
@@ -29,6 +29,7 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
     SendGain,
     Setting,
+    StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_machine import begin
@@ -189,7 +190,7 @@ def test_an_abort_before_the_command_stops_motors_where_it_stands_too() -> None:
     walk = armed()
     walk.altitude_m += 0.5
     walk.pass_s(0.4)
-    walk.give(AbortRequested(ABORT, walk.now_s))
+    walk.give(StopRequested(StopRequest(ABORT), walk.now_s))
     assert walk.state is State.DISARM
     walk.pass_s(1.1)
     assert Action.MOTORS_OFF in walk.actions
@@ -275,7 +276,7 @@ def drain(walk: TrialDriver) -> None:
 
 
 def press_abort(walk: TrialDriver) -> None:
-    walk.give(AbortRequested(ABORT, walk.now_s))
+    walk.give(StopRequested(StopRequest(ABORT), walk.now_s))
 
 
 def freeze(walk: TrialDriver) -> None:
