@@ -36,7 +36,7 @@ from typing import Any, Final
 import httpx2
 import numpy as np
 
-from app.vehicles.mavlink.dialects import PAPARAZZI, Message, number, text
+from app.autopilots.dialects import PAPARAZZI, Message, number, text
 from bench.link import LOOPBACK, SO_TIMESTAMPNS
 
 LIMIT_S: Final = 0.05

@@ -22,6 +22,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.experiments import experiment_of
 from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
 from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.definition import Definition, Flight
@@ -142,7 +143,7 @@ def judge(number: int, *, name: str) -> Result:
     definition = Definition(experiment=experiment.name, strategy="calibrated")
     try:
         first = vehicle.first_flight(experiment.space.mapping(experiment.space.default), seeds[0])
-        proposal = next_proposal(definition, [first])
+        proposal = next_proposal(definition, experiment_of(definition), [first])
     except TrajectoryError as error:
         return Result({}, {}, np.nan, "failed", 0, (), np.nan, frozenset(), frozenset(), str(error))
     gate = check_policy(definition, experiment, experiment.space, proposal.gains, [first], spread=proposal.spread)

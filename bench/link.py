@@ -30,9 +30,9 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.dialects import PAPARAZZI, FieldValue, Message, number
 from app.core.clock import ScaledClock
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.dialects import PAPARAZZI, FieldValue, Message, number
 from app.vehicles.mavlink.link import Link
 
 LIMIT_S: Final = 0.05

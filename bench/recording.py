@@ -25,15 +25,15 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
 
+from app.autopilots.dialects import Message, number
+from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import ScaledClock
 from app.simdrone.body import new_body
 from app.simdrone.drone import Drone, Server
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.ground_observation import Ground
-from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialResult
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -68,7 +68,7 @@ class Counting:
 
     def __init__(self, transport: Transport, autopilot: str) -> None:
         self._transport = transport
-        self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
+        self._codec = AUTOPILOTS[autopilot].dialect.codec(system=1, component=1)
         self.sent_ms: list[int] = []
         self.packets = 0
 
@@ -175,7 +175,7 @@ def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[
 def logged(folder: Path, autopilot: str) -> Counter[int]:
     """Count the positions in the telemetry log by time stamp."""
     [log] = folder.glob("*.tlog")
-    codec, data = PROFILES[autopilot].dialect.codec(system=1, component=1), log.read_bytes()
+    codec, data = AUTOPILOTS[autopilot].dialect.codec(system=1, component=1), log.read_bytes()
     found: list[int] = []
     place = 0
     while place < len(data):

@@ -8,6 +8,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.bundles.contents import CONTENTS, Campaign, Proposal, Record, Trial
 from app.bundles.reader import Bundle, trajectory_row
 from app.campaigns import history
@@ -102,7 +103,7 @@ def _definition(where: str, source: JsonObject, new_ids: Mapping[int, int]) -> J
             **source,
             "start": {**source["start"], "donor": {**donor, "campaign_id": new_ids[donor["campaign_id"]]}},
         }
-    if wrong := problems_of(core_definition(Definition.model_validate(source))):
+    if wrong := problems_of(core_definition(Definition.model_validate(source)), EXPERIMENTS):
         raise _refused(f"{where}.definition.{wrong[0].field}", wrong[0].reason)
     return source
 

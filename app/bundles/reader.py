@@ -18,11 +18,11 @@ import numpy as np
 import zstandard
 from pydantic import BaseModel, ValidationError
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Photo, Record
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
-from app.core.experiments import EXPERIMENTS
 from app.db.earlier_ends import give_end
 from app.db.models import TrajectoryRow
 from app.db.trajectories import unpack

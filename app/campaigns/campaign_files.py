@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field, ValidationError
 
+from app.autopilots.experiments import EXPERIMENTS, experiment_of, get_experiment
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
 from app.common.errors import InputError, NotFoundError, Problem
 from app.common.schemas import Number, Text
 from app.core.definition import Definition
-from app.core.experiments import EXPERIMENTS, experiment_of, get_experiment
 from app.core.policy import shortened
 from app.core.tuning.definition_checks import MAX_FLIGHTS
 from app.core.tuning.strategies import STRATEGIES

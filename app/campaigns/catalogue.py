@@ -7,10 +7,11 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from app import __version__
+from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import AUTOPILOTS
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema
-from app.core.experiments import EXPERIMENTS
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Strategy
@@ -102,6 +103,19 @@ class VehicleKindInfo(Schema):
     highest_set_point_m: float | None = Field(description="highest altitude that it is commanded to fly to; null: any")
 
 
+class AutopilotInfo(Schema):
+    """An autopilot over MAVLink."""
+
+    name: str
+    title: str
+    label: str = Field(description="title with the vehicle that usually has it")
+    experiments: list[str] = Field(description="those that tune its gains, the default first")
+    address: str = Field(description="usual address of a vehicle")
+    simulated_address: str = Field(description="usual address of a simulated one")
+    recordings: str = Field(description="what the controller check takes of it")
+    recording_types: list[str] = Field(description="file types of these")
+
+
 class PresetInfo(Schema):
     """A campaign that is ready to be created."""
 
@@ -115,6 +129,7 @@ class Catalogue(Schema):
     experiments: list[ExperimentInfo]
     strategies: list[StrategyInfo]
     vehicle_kinds: list[VehicleKindInfo]
+    autopilots: list[AutopilotInfo]
     presets: list[PresetInfo]
 
 
@@ -146,6 +161,10 @@ def get_catalogue() -> Catalogue:
         ],
         strategies=[_strategy(each) for each in STRATEGIES.values()],
         vehicle_kinds=[_kind(kind) for kind in VEHICLE_KINDS.values()],
+        autopilots=[
+            AutopilotInfo.view_of(each, experiments=[own.name for own in each.experiments])
+            for each in AUTOPILOTS.values()
+        ],
         presets=[preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
     )
 

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 
+from app.autopilots.experiments import experiment_of
 from app.core.definition import Definition, Flight
-from app.core.experiments import experiment_of
 from app.core.experiments.base import ParameterDistribution
 from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.campaign_models import known_distribution
-from app.core.tuning.gate import GateResult, check_policy, space_of
+from app.core.tuning.gate import GateResult, check_policy
 from app.core.tuning.proposals import Advice, advise, next_proposal
 from app.core.tuning.stop_rules import StopVerdict, evaluate_stop_rule
 from app.core.tuning.strategy import Proposal
@@ -52,7 +52,7 @@ def compute(past: CampaignHistory) -> ProposalComputation:
     """
     definition, flights = _with_reopening(past), past.flights
     experiment = experiment_of(definition)
-    proposal = next_proposal(definition, flights, past.donor)
+    proposal = next_proposal(definition, experiment, flights, past.donor)
     stop_verdict = evaluate_stop_rule(
         past.definition, flights, proposal, battery_v=past.battery_v, open_until_flight=past.open_until_flight
     )
@@ -60,7 +60,7 @@ def compute(past: CampaignHistory) -> ProposalComputation:
     gate = check_policy(
         definition,
         experiment,
-        space_of(definition),
+        experiment.space.narrowed(definition.bounds),
         proposal.gains,
         flights,
         start=proposal.gains if proposal.kind == "start" else None,

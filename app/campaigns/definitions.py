@@ -11,6 +11,7 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import EXPERIMENTS, experiment_of, get_experiment
 from app.campaigns import history, repository
 from app.campaigns.schemas import Definition as DefinitionIn
 from app.campaigns.schemas import Donor, Start
@@ -18,7 +19,6 @@ from app.common.errors import NotFoundError
 from app.common.states import TrialState
 from app.core.definition import Definition, problems_of_options
 from app.core.errors import InputError, Problem
-from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
 from app.core.tuning.confirmation import compare_winner
 from app.core.tuning.definition_checks import check_definition, highest_set_point_m
@@ -89,7 +89,7 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
             options.update(check_options(vehicle.kind, vehicle.options, field="vehicle"))
 
     problems = [
-        *_refusals(lambda: check_definition(definition), "definition."),
+        *_refusals(lambda: check_definition(definition, EXPERIMENTS), "definition."),
         *_refusals(take_options, ""),
         *_mismatch(definition, vehicle.kind, options),
     ]
@@ -124,7 +124,10 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
     elif options and definition.experiment not in (flies := described.experiments_with(options)):
         reason = f"{definition.experiment!r} tunes gains that this vehicle does not have; it flies {', '.join(flies)}"
         yield Problem("definition.experiment", reason)
-    elif (excess_m := highest_set_point_m(definition) - described.highest_set_point_m) > 0.0:
+    elif (
+        excess_m := highest_set_point_m(definition, EXPERIMENTS.get(definition.experiment))
+        - described.highest_set_point_m
+    ) > 0.0:
         yield Problem(
             "definition.experiment_options.height_m",
             f"must be lower by {excess_m:g} m, or the steps smaller: a vehicle of this kind flies "

@@ -9,12 +9,12 @@ from typing import Final, Literal, cast
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, Scatter
 from app.core.records.flight_events import FlightEvent, flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
@@ -32,14 +32,6 @@ from app.figures.theme import ThemeName
 from app.vehicles.registry import get_kind
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
-_STEPS: Final = "Altitude steps"
-_CURVES: Final[Mapping[str, str]] = {
-    "altitude-steps": _STEPS,
-    "altitude-steps-ardupilot": _STEPS,
-    "altitude-steps-px4": _STEPS,
-    "pitch-tracking": "Pitch error curves",
-}
-_TAKEOFF_CURVES: Final = "Takeoff curves"
 _LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0), "throttle": Range(0.0, 1.0)}
 """Limits of commands."""
 _PANELS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
@@ -133,7 +125,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
-        curves_title=_CURVES.get(experiment.name, _TAKEOFF_CURVES),
+        curves_title=experiment.curves_title,
         window=view.window,
         chosen=view.chosen,
         altitude_limit_m=_altitude_limit(campaign, experiment.output),

@@ -9,6 +9,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of, space_of
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.proposals import read_donor
@@ -16,11 +17,10 @@ from app.campaigns.schemas import GainsPrediction, PredictedCurve
 from app.common.schemas import Interval
 from app.common.states import TrialState
 from app.core.definition import Definition, Flight
-from app.core.experiments import experiment_of
+from app.core.experiments.base import Experiment
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
-from app.core.tuning.gate import space_of
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database
@@ -98,7 +98,7 @@ def predict_planned(
     if ahead is not None and (ahead.digest, ahead.gains) == (question.digest, question.gains):
         return ahead.prediction
     flights = history.flights_of(session, campaign.id, recorded=question.flown) if question.flown else ()
-    repeat = predict_repeat(question.definition, flights, question.gains)
+    repeat = predict_repeat(question.experiment, flights, question.gains)
     return _stored(question, _checked(question, repeat))
 
 
@@ -113,9 +113,8 @@ class _Question:
     flown: set[int]
 
     @property
-    def output(self) -> str:
-        """The scored channel."""
-        return experiment_of(self.definition).output
+    def experiment(self) -> Experiment:
+        return experiment_of(self.definition)
 
 
 def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Question:
@@ -140,7 +139,7 @@ def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gain
     question = _question(session, repository.get_campaign(session, campaign_id), asked)
     kept = cache.find(question.digest)
     is_new = not question.flown and kept is None
-    modelled = modelled_flights(question.definition, history.flown_gains(question.trials)) if is_new else set()
+    modelled = modelled_flights(question.experiment, history.flown_gains(question.trials)) if is_new else set()
     recorded = question.flown | modelled
     return _Read(
         question,
@@ -152,11 +151,15 @@ def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gain
 
 def _predict(cache: PredictorCache, read: _Read) -> Proposal | None:
     question, kept = read.question, read.kept
-    predicted = predict_repeat(question.definition, read.flights, question.gains)
+    predicted = predict_repeat(question.experiment, read.flights, question.gains)
     if predicted is None:
         fitted = cache.get(
             question.digest,
-            lambda: flight_predictor(question.definition, read.flights, read.donor) if kept is None else kept.predictor,
+            lambda: (
+                flight_predictor(question.definition, question.experiment, read.flights, read.donor)
+                if kept is None
+                else kept.predictor
+            ),
         )
         predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
     return _checked(question, predicted)
@@ -169,7 +172,7 @@ def _checked(question: _Question, predicted: Proposal | None) -> Proposal | None
     lower = None if predicted.interval is None else predicted.interval.lower
     if history.is_prediction_informative(lower, question.trials):
         return predicted
-    curve = None if predicted.predicted is None else _only(predicted.predicted, question.output)
+    curve = None if predicted.predicted is None else _only(predicted.predicted, question.experiment.output)
     return replace(predicted, predicted=curve, predicted_error=None, interval=None)
 
 
@@ -177,8 +180,8 @@ def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
     """The prediction with as much of its curve and band as is drawn."""
     if predicted is None or predicted.predicted is None:
         return predicted
-    curve = _only(predicted.predicted, question.output, *band_channels(question.output))
-    chosen = select_samples(curve.time_s, curve[question.output], STORED_POINTS)
+    curve = _only(predicted.predicted, question.experiment.output, *band_channels(question.experiment.output))
+    chosen = select_samples(curve.time_s, curve[question.experiment.output], STORED_POINTS)
     thin = {name: values[chosen] for name, values in curve.channels.items()}
     return replace(predicted, predicted=replace(curve, time_s=curve.time_s[chosen], channels=thin))
 
@@ -186,12 +189,12 @@ def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
     curve = None if predicted is None else predicted.predicted
     interval = None if predicted is None else predicted.interval
-    lower, upper = (_edge(curve, channel) for channel in band_channels(question.output))
+    lower, upper = (_edge(curve, channel) for channel in band_channels(question.experiment.output))
     return GainsPrediction(
         gains=dict(question.gains),
         predicted_error=None if predicted is None else predicted.predicted_error,
         interval=None if interval is None else Interval.model_validate(interval, from_attributes=True),
-        curve=_curve(curve, question.output),
+        curve=_curve(curve, question.experiment.output),
         lower=lower,
         upper=upper,
     )

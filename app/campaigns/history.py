@@ -11,6 +11,7 @@ from typing import Final, Literal
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of
 from app.campaigns import repository
 from app.common.conflict_checks import check_transition
 from app.common.errors import NotFoundError, StorageError
@@ -27,7 +28,6 @@ from app.common.states import (
     TrialState,
 )
 from app.core.definition import Definition, Donor, Flight, Prediction
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative

@@ -10,6 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of, space_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
@@ -17,10 +18,8 @@ from app.campaigns.figure_data import history_of
 from app.campaigns.proposals import is_stale, read_history
 from app.common.errors import GainlineError
 from app.common.states import JobState
-from app.core.experiments import experiment_of
 from app.core.formatting import percent
-from app.core.tuning.gate import space_of
-from app.core.tuning.landscape import Landscape, LandscapePlan, free_gains
+from app.core.tuning.landscape import Landscape, LandscapeGrid, LandscapePlan, free_gains, plan_grid
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
@@ -88,6 +87,11 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
         centre=_grid_centre(past, proposal),
         marks=(*(flight.gains for flight in past.flights), proposal.gains),
     )
+
+
+def plan(order: LandscapePlan) -> LandscapeGrid | None:
+    """Return the model and the grid, for a compute process; None without a model, or with fewer than two free gains."""
+    return plan_grid(order, experiment_of(order.definition))
 
 
 def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:

@@ -10,6 +10,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of, frozen_digest
@@ -17,7 +18,6 @@ from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
 from app.core.definition import Definition, Flight
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Check, Experiment, ParameterDistribution, prior_distribution
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult

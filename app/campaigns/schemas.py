@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.common.schemas import (
     Gains,
     Gate,
@@ -102,7 +103,7 @@ class StopRule(Request):
 
 
 def _recommended_strategy(definition: dict[str, object]) -> str:
-    return recommended_strategy(str(definition.get("experiment", "")))
+    return recommended_strategy(EXPERIMENTS.get(str(definition.get("experiment", ""))))
 
 
 class Definition(Request):

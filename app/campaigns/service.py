@@ -12,6 +12,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext
+from app.autopilots.experiments import get_experiment
 from app.campaigns import history, repository
 from app.campaigns.definitions import check_campaign, fill_in_donor, stored
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
@@ -37,7 +38,6 @@ from app.common.errors import BusyError, ConflictError, InputError, NotFoundErro
 from app.common.schemas import LONGEST_NAME, OptionValue, Page, decode_cursor, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
-from app.core.experiments import get_experiment
 from app.core.formatting import confidence_text, format_gains, named_flights
 from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow

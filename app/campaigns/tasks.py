@@ -9,7 +9,7 @@ import structlog
 
 from app.campaigns import computation, landscapes, proposals
 from app.common.errors import GainlineError
-from app.core.tuning.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob
@@ -68,7 +68,7 @@ class LandscapeJob:
         started_s = monotonic()
         with self.database.read() as session:
             plan = landscapes.read_plan(session, job.campaign_id, job.order)
-        survey = self.pool.run(plan_grid, plan)
+        survey = self.pool.run(landscapes.plan, plan)
         if survey is None:
             raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
         points = survey.points()

@@ -6,13 +6,13 @@ from typing import Final
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import space_of
 from app.campaigns import history, proposals
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import ChoiceKind, Variant
 from app.campaigns.statistics import standing_within_bounds_of
 from app.common.errors import ConflictError
 from app.core.policy import Gains
-from app.core.tuning.gate import space_of
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 
 _KINDS: Final[Mapping[str, ChoiceKind]] = {

@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from app.autopilots.takeoffs import Takeoff
 from app.bundles.export import write_bundle
 from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
@@ -22,7 +23,6 @@ from app.common.settings import Settings
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.logs.takeoffs import Takeoff
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
@@ -83,12 +83,14 @@ def companion_of(file: Path) -> Path | None:
 
 
 def _read(file: Path, takeoff: int | None) -> Takeoff:
+    from app.autopilots.readers import read_takeoff  # noqa: PLC0415 - imports every reader
+
     try:
         with ExitStack() as files:
             stream = files.enter_context(file.open("rb"))
             beside = companion_of(file)
             companion = None if beside is None else files.enter_context(beside.open("rb"))
-            return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
+            return read_takeoff(stream, name=file.name, number=takeoff, companion=companion)
     except OSError as error:
         raise unreadable_error(file, error, "a log") from error
 

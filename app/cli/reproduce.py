@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from app.autopilots.paparazzi.log import read_paparazzi
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
 from app.controller_checks.check import AUTOPILOTS, autopilot_of, examine_file
@@ -190,7 +191,7 @@ def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
             companion = opened.enter_context(beside.open("rb")) if beside != file and beside.is_file() else None
             data = opened.enter_context(file.open("rb"))
             _refuse_other_autopilots(file, data)
-            return check_log(data, name=file.name, companion=companion, given=given)
+            return check_log(read_paparazzi(data, companion), name=file.name, given=given)
     except OSError as error:
         raise InputError(
             f"{file} could not be read: {error.strerror or error}.", hint="Use a readable Paparazzi .data file."

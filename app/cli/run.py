@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 from app.accounts.permissions import LOCAL_CLI
+from app.autopilots.experiments import experiment_of
 from app.campaigns import history, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.campaign_files import (
@@ -30,7 +31,6 @@ from app.common.errors import InputError, Problem
 from app.common.states import HISTORY_TRIAL_STATES, CampaignState, TrialState, VehicleState
 from app.core.clock import REAL_TIME
 from app.core.definition import Definition
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains

@@ -9,6 +9,7 @@ from typing import Final
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import experiment_of, get_experiment
 from app.campaigns import history
 from app.campaigns import service as campaigns_service
 from app.campaigns.definitions import definition_of
@@ -16,7 +17,6 @@ from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
 from app.compare.schemas import FlightDifference, FlightSetting
 from app.core.definition import Option, with_defaults
-from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
 from app.core.formatting import count, format_gains, plus_minus, short
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter

@@ -6,14 +6,15 @@ from typing import Final
 
 import numpy as np
 
-from app.controller_checks.autopilot import Autopilot, Beginning, Recording
+from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
+from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
+from app.controller_checks.autopilot import Autopilot, Upload
 from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
 from app.core.control.ardupilot import OUTPUTS
 from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
 from app.core.control.ardupilot_replay import LoopTrace, replayed
-from app.logs.ardupilot_log import read_ardupilot_log
-from app.logs.ardupilot_trace import is_ardupilot_trace, read_ardupilot_trace
-from app.logs.dataflash import is_dataflash
+from app.logs.formats import Format
 
 _PRECISION: Final = "firmware and recording have single precision"
 
@@ -39,16 +40,13 @@ _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
 _UP: Final = "Altitude, climb rate and acceleration are positive up."
 
 
-def _recognises(beginning: Beginning) -> bool:
-    return is_dataflash(beginning.raw) or is_ardupilot_trace(beginning.unzipped)
+def _examine_log(upload: Upload) -> Result:
+    compared = _compared(ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name))
+    return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
 
 
-def _examine(recording: Recording) -> Result:
-    stream, name = recording.stream, recording.name
-    if is_dataflash(recording.beginning.raw):
-        compared = _compared(read_ardupilot_log(stream, name=name))
-        return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
-    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(stream, name=name)))
+def _examine_trace(upload: Upload) -> Result:
+    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(upload.stream, name=upload.name)))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -96,6 +94,8 @@ ARDUPILOT: Final = Autopilot(
         {"reference": ("Shaped target", OUTPUTS[:3]), "commands": ("Controllers and throttle", OUTPUTS[3:])}
     ),
     note=_UP,
-    recognises=_recognises,
-    examine=_examine,
+    log=Format.DATAFLASH,
+    is_trace=is_ardupilot_trace,
+    examine_log=_examine_log,
+    examine_trace=_examine_trace,
 )

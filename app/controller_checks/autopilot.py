@@ -5,23 +5,14 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from app.controller_checks.results import FigureName, Result, Signals
-
-
-@dataclass(frozen=True, slots=True)
-class Beginning:
-    """The first bytes of a file, as they are and, if the file is gzipped, unzipped."""
-
-    raw: bytes
-    unzipped: bytes
+from app.logs.formats import Format
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recording:
-    """A file to examine: its content, beginning and name, the file that was written beside it, and gains that a person
-    gave."""
+class Upload:
+    """A file to examine: its content and name, the file that was written beside it, and gains that a person gave."""
 
     stream: BinaryIO
-    beginning: Beginning
     name: str
     companion: BinaryIO | None = None
     given: Mapping[str, float] | None = None
@@ -32,9 +23,9 @@ class Autopilot:
     """An autopilot whose vertical loop has a replica.
 
     `recordings` completes the sentence “Give …”; `figures` holds a title and the signals one below another for each
-    figure that its recordings have; `note` is what a reader of its signals must know. `recognises` says whether a file
-    with this beginning is a recording of its loop; `examine` compares it with the replica and raises InputError that
-    names what cannot be read.
+    figure that its recordings have; `note` is what a reader of its signals must know. `log` is the format of its own
+    log; `is_trace` says whether a file with these first bytes is a recorded run of its loop. `examine_log`
+    and `examine_trace` compare them with the replica and raise InputError that names what cannot be read.
     """
 
     name: str
@@ -43,5 +34,7 @@ class Autopilot:
     signals: Signals
     figures: Mapping[FigureName, tuple[str, tuple[str, ...]]]
     note: str
-    recognises: Callable[[Beginning], bool]
-    examine: Callable[[Recording], Result]
+    log: Format
+    is_trace: Callable[[bytes], bool]
+    examine_log: Callable[[Upload], Result]
+    examine_trace: Callable[[Upload], Result]

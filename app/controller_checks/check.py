@@ -3,7 +3,6 @@
 The recording is the log of a flight, or a trace with a row for every step.
 """
 
-import zlib
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
@@ -11,30 +10,28 @@ from types import MappingProxyType
 from typing import BinaryIO, Final
 
 from app.controller_checks.ardupilot import ARDUPILOT
-from app.controller_checks.autopilot import Autopilot, Beginning, Recording
+from app.controller_checks.autopilot import Autopilot, Upload
 from app.controller_checks.paparazzi import PAPARAZZI
 from app.controller_checks.px4 import PX4
 from app.controller_checks.results import Result
 from app.core.errors import InputError, Problem
+from app.logs.formats import HEAD_BYTES, recognise
 
 AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType({each.name: each for each in (ARDUPILOT, PX4, PAPARAZZI)})
 """Every autopilot with a replica, by name. The first one that recognises a recording examines it; Paparazzi, to which
 any gzipped file may belong, is last."""
-
-_HEAD_BYTES: Final = 4096
-_GZIP_WINDOW: Final = 31
 
 
 def examine(
     stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
 ) -> Result:
     """Check a log or a trace, whichever the content is. Raises InputError that names what cannot be read."""
-    beginning = _beginning_of(stream)
-    if (autopilot := _recognised(beginning)) is not None:
-        return autopilot.examine(
-            Recording(stream=stream, beginning=beginning, name=name, companion=companion, given=given)
-        )
-    reason = "is empty" if not beginning.raw else "contains no signals of a control loop that Gainline has a replica of"
+    head = _head_of(stream)
+    upload = Upload(stream=stream, name=name, companion=companion, given=given)
+    if (autopilot := _recognised(head)) is not None:
+        is_log = recognise(head) is autopilot.log
+        return autopilot.examine_log(upload) if is_log else autopilot.examine_trace(upload)
+    reason = "contains no signals of a control loop that Gainline has a replica of" if head else "is empty"
     raise InputError(
         f"{name} is not a recording of the vertical loop.",
         hint=f"Use {'; '.join(each.recordings for each in AUTOPILOTS.values())}.",
@@ -44,7 +41,7 @@ def examine(
 
 def autopilot_of(stream: BinaryIO) -> Autopilot | None:
     """The autopilot whose recording this is; None if it is of none."""
-    return _recognised(_beginning_of(stream))
+    return _recognised(_head_of(stream))
 
 
 def examine_content(content: bytes, *, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
@@ -64,20 +61,14 @@ def examine_file(path: Path) -> Result:
         ) from error
 
 
-def _beginning_of(stream: BinaryIO) -> Beginning:
+def _head_of(stream: BinaryIO) -> bytes:
     stream.seek(0)
-    head = stream.read(_HEAD_BYTES)
+    head = stream.read(HEAD_BYTES)
     stream.seek(0)
-    return Beginning(head, _unzipped(head))
+    return head
 
 
-def _recognised(beginning: Beginning) -> Autopilot | None:
-    return next((each for each in AUTOPILOTS.values() if each.recognises(beginning)), None)
-
-
-def _unzipped(head: bytes) -> bytes:
-    """The beginning of the file that is gzipped into one with this head; the head itself if it is not gzipped."""
-    try:
-        return zlib.decompressobj(_GZIP_WINDOW).decompress(head)
-    except zlib.error:
-        return head
+def _recognised(head: bytes) -> Autopilot | None:
+    """The autopilot whose log, or a trace of whose loop, begins so."""
+    log = recognise(head)
+    return next((each for each in AUTOPILOTS.values() if log is each.log or each.is_trace(head)), None)

@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import BinaryIO, Final
+from typing import Final
 
 import numpy as np
 
-from app.controller_checks.autopilot import Autopilot, Beginning, Recording
+from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
+from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
+from app.controller_checks.autopilot import Autopilot, Upload
 from app.controller_checks.results import (
     Result,
     Signal,
@@ -34,8 +36,9 @@ from app.core.control.loop_log import (
 from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
-from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
-from app.logs.paparazzi import is_paparazzi, read_loop_log
+from app.logs.base import refused
+from app.logs.formats import Format
+from app.logs.paparazzi import HINT
 
 _MAX_DIGITS: Final = 9
 
@@ -96,28 +99,29 @@ class LogCheck:
         return f"{'; '.join([*texts[:1], *changes[1:]])} ({self.gains_from})"
 
 
-def check_log(
-    stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
-) -> LogCheck:
+def check_log(recording: PaparazziRecording, *, name: str, given: Mapping[str, float] | None = None) -> LogCheck:
     """Check a .data file of Paparazzi.
 
     The gains are those given, else those that its commands follow from. Raises InputError when it has no VERT_LOOP, or
     its gains cannot be determined.
     """
-    read = read_loop_log(stream, companion)
-    flown = read.flown if given is None else [FlownGains(0.0, given)]
+    loop = recording.loop
+    if loop is None:
+        raise refused("contains no VERT_LOOP, the loop's inputs and commands", HINT)
+    flown = recording.flown if given is None else [FlownGains(0.0, given)]
     if not any(each.gains for each in flown):
         raise InputError(
             f"{name} does not contain the gains flown, and its motion is too small to compute them.",
             problems=(Problem("gains", "are needed"),),
             hint="Add the .log file written with it, or give the gains (on the command line: --gains KP,KI,KD).",
         )
-    source = "given" if given is not None else "of the log" if read.are_logged else "computed from the commands"
-    commands, drawn = compare_commands(read.log, flown)
-    simulated = compare_simulation(read.log)
+    source = "given" if given is not None else "of the log" if recording.are_logged else "computed from the commands"
+    commands, drawn = compare_commands(loop, flown)
+    simulated = compare_simulation(loop)
     simulation, overlays = (None, (drawn,)) if simulated is None else (simulated[0], (simulated[1], drawn))
-    better = read.flown[0].gains if len(read.flown) == 1 and given not in (None, read.flown[0].gains) else None
-    return LogCheck(flown, source, better, read.notes, commands, simulation, overlays)
+    computed = recording.flown
+    better = computed[0].gains if len(computed) == 1 and given not in (None, computed[0].gains) else None
+    return LogCheck(flown, source, better, recording.notes, commands, simulation, overlays)
 
 
 def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
@@ -136,15 +140,14 @@ def _is_whole(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= _MAX_DIGITS
 
 
-def _recognises(beginning: Beginning) -> bool:
-    return is_paparazzi(beginning.raw) or may_be_loop_trace(beginning.raw)
+def _examine_log(upload: Upload) -> Result:
+    recording = read_paparazzi(upload.stream, upload.companion)
+    return _result_of_log(check_log(recording, name=upload.name, given=upload.given))
 
 
-def _examine(recording: Recording) -> Result:
-    stream, name = recording.stream, recording.name
-    if is_paparazzi(recording.beginning.raw):
-        return _result_of_log(check_log(stream, name=name, companion=recording.companion, given=recording.given))
-    return result_of_trace(PAPARAZZI.name, _SIGNALS, _replayed(read_loop_trace_stream(stream, name=name)))
+def _examine_trace(upload: Upload) -> Result:
+    trace = read_loop_trace_stream(upload.stream, name=upload.name)
+    return result_of_trace(PAPARAZZI.name, _SIGNALS, _replayed(trace))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -254,6 +257,8 @@ PAPARAZZI: Final = Autopilot(
         {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
     ),
     note=_DOWN,
-    recognises=_recognises,
-    examine=_examine,
+    log=Format.PAPARAZZI,
+    is_trace=may_be_loop_trace,
+    examine_log=_examine_log,
+    examine_trace=_examine_trace,
 )

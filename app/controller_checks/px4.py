@@ -7,16 +7,17 @@ from typing import Final
 
 import numpy as np
 
-from app.controller_checks.autopilot import Autopilot, Beginning, Recording
+from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.replica_check import px4_loop_log
+from app.autopilots.px4.trace import is_px4_trace, read_px4_trace
+from app.controller_checks.autopilot import Autopilot, Upload
 from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_replay import LoopTrace, Replay, replayed
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
-from app.logs.px4_log import read_px4_log
-from app.logs.px4_trace import is_px4_trace, read_px4_trace
-from app.logs.ulog_tables import is_ulog
+from app.logs.formats import Format
 
 _TOLERANCE: Final = 1e-5
 
@@ -58,21 +59,19 @@ _HOW: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
 )
 
 
-def _recognises(beginning: Beginning) -> bool:
-    return is_ulog(beginning.raw) or is_px4_trace(beginning.unzipped)
+def _examine_log(upload: Upload) -> Result:
+    compared = _compared(px4_loop_log(read_px4(upload.stream), name=upload.name))
+    if not compared.recorded:
+        raise InputError(
+            f"{upload.name} cannot be compared with the replica.",
+            hint="Give a .ulg log with hover_thrust_estimate and trajectory_setpoint (bit 0 of SDLOG_PROFILE).",
+            problems=(Problem("file", "has no set-point and no hover thrust beside any row in flight"),),
+        )
+    return _judged_by_medians(compared, _LOG_MEDIANS, kind="log")
 
 
-def _examine(recording: Recording) -> Result:
-    if is_ulog(recording.beginning.raw):
-        compared = _compared(read_px4_log(recording.stream, name=recording.name))
-        if not compared.recorded:
-            raise InputError(
-                f"{recording.name} cannot be compared with the replica.",
-                hint="Give a .ulg log with hover_thrust_estimate and trajectory_setpoint (bit 0 of SDLOG_PROFILE).",
-                problems=(Problem("file", "has no set-point and no hover thrust beside any row in flight"),),
-            )
-        return _judged_by_medians(compared, _LOG_MEDIANS, kind="log")
-    trace = read_px4_trace(recording.stream, name=recording.name)
+def _examine_trace(upload: Upload) -> Result:
+    trace = read_px4_trace(upload.stream, name=upload.name)
     replay = _replayed(trace)
     return (
         _judged_by_medians(replay, _MEDIANS, kind="trace")
@@ -176,6 +175,8 @@ PX4: Final = Autopilot(
         }
     ),
     note=_DOWN,
-    recognises=_recognises,
-    examine=_examine,
+    log=Format.ULOG,
+    is_trace=is_px4_trace,
+    examine_log=_examine_log,
+    examine_trace=_examine_trace,
 )

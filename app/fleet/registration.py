@@ -10,12 +10,12 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext, require
+from app.autopilots.experiments import get_experiment
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
 from app.core.errors import GainlineError
-from app.core.experiments import get_experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, setting_text
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from app.autopilots.experiments import get_experiment
 from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
 from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, OptionValue

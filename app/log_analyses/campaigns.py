@@ -8,6 +8,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import RequestContext
+from app.autopilots.takeoffs import Takeoff
 from app.campaigns import service as campaigns
 from app.campaigns.schemas import Campaign, Definition, LogEvidence, NewCampaign, Start, StopRule
 from app.campaigns.trials.records import plan_and_import
@@ -21,7 +22,6 @@ from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 from app.log_analyses.copter_start import CopterStart
 from app.log_analyses.takeoffs import logged_takeoffs
-from app.logs.takeoffs import Takeoff
 
 _UNNAMED: Final = "Log"
 _FURTHER_FLIGHTS: Final = 6

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.core.analysis.analysis import Analysis
 from app.core.control.ardupilot_parameters import in_older_names
 from app.core.definition import LogEvidence
 from app.core.errors import Problem, TrajectoryError
-from app.core.experiments.altitude_steps_copters import ArduPilotSteps, Px4Steps
 from app.core.experiments.copter_steps import CopterSteps, vector_of
 
 _EXPERIMENTS: Final[Mapping[str, CopterSteps]] = MappingProxyType(
-    {each.autopilot: each for each in (ArduPilotSteps(), Px4Steps())}
+    {each.autopilot: each for each in EXPERIMENTS.values() if isinstance(each, CopterSteps)}
 )
 
 

@@ -10,8 +10,8 @@ from app.log_analyses.schemas import LogAnalysis
 from app.processes.sandbox import FILE, run_limited
 
 if TYPE_CHECKING:
+    from app.autopilots.takeoffs import Takeoff
     from app.log_analyses.copter_start import CopterStart
-    from app.logs.takeoffs import Takeoff
 
 
 def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> LogAnalysis:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
+from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import Takeoff as Experiment
@@ -21,7 +22,6 @@ from app.log_analyses.schemas import (
     ParameterFile,
     TakeoffNumbers,
 )
-from app.logs.takeoffs import NOT_COMMANDED, Takeoff
 
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""

@@ -1,18 +1,13 @@
-"""What every log reader needs: a log's bytes, memory-mapped where possible, and the names of each autopilot's gains."""
+"""What every log reader needs: a log's bytes, memory-mapped where possible, and tables of its messages."""
 
 import io
 import mmap
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from types import MappingProxyType
+from collections.abc import Iterator, Mapping
 from typing import BinaryIO, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.ardupilot_parameters import GAINS as ARDUPILOT_GAINS
-from app.core.control.ardupilot_parameters import NEWER_NAMES
-from app.core.control.loop_log import GAINS
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 
@@ -61,47 +56,3 @@ def rows_of(table: Table, clock: str, *names: str) -> Iterator[tuple[float, ...]
     if {clock, *names} <= table.keys():
         columns = [numbers(table[clock]) / 1e6, *(numbers(table[name]) for name in names)]
         yield from zip(*(column.tolist() for column in columns), strict=True)
-
-
-PAPARAZZI: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
-"""Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
-
-
-@dataclass(frozen=True, slots=True)
-class LoggedGain:
-    """A gain of an experiment by its name in the log, with the `factor` from the gain to the value in the log."""
-
-    name: str
-    gain: str
-    factor: float = 1.0
-
-    def value(self, logged: float) -> float:
-        """The gain for a value in the log, to the seven digits of single precision."""
-        return logged if self.factor == 1.0 else float(f"{logged / self.factor:.7g}")
-
-
-GainSets = Sequence[Sequence[LoggedGain]]
-
-
-def _own_names(*names: str) -> Sequence[LoggedGain]:
-    return tuple(LoggedGain(name, name) for name in names)
-
-
-PAPARAZZI_SETS: Final[GainSets] = (_own_names(*GAINS),)
-
-ARDUPILOT_SETS: Final[GainSets] = (
-    _own_names(*ARDUPILOT_GAINS),
-    tuple(
-        LoggedGain(newer, older, 1.0 / factor)
-        for newer, (older, factor) in NEWER_NAMES.items()
-        if older in ARDUPILOT_GAINS
-    ),
-)
-"""Until 4.6, and from 4.7 on."""
-
-PX4_SETS: Final[GainSets] = (_own_names("MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"),)
-
-
-def names_in(sets: GainSets) -> frozenset[str]:
-    """All names in these sets, as in the log."""
-    return frozenset(gain.name for gains in sets for gain in gains)

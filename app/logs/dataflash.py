@@ -1,27 +1,29 @@
 """Reader of ArduPilot's on-board logs (.bin, "DataFlash"): self-describing binary messages.
 
 Every message begins with A3 95 and its type; messages of type 128 (FMT) define the length, name, format and columns of
-each type. Only the few types needed for takeoffs are decoded, so that a log of several hours takes seconds.
+each type. Only the few types that are needed are decoded, so that a log of several hours takes seconds.
 """
 
 import re
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import BinaryIO, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from app.core.records.trajectory import Samples
-from app.logs.base import ARDUPILOT_SETS, Contents, Table, contents, names_in, numbers, refused, rows_of
-from app.logs.takeoffs import FlightLog, LogEvent, Setting
+from app.logs.base import Contents, Table, numbers
 
 _SYNC: Final = b"\xa3\x95"
 _FMT: Final = 128
 _FMT_BYTES: Final = 89
 _MAX_OF_A_TYPE: Final = 5_000_000
+_BACK_US: Final = 1e6
+"""If the clock goes back by more than this, the vehicle restarted."""
+_BETWEEN_BOOTS_US: Final = 20e6
 
 _FORMATS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -31,16 +33,6 @@ _FORMATS: Final[Mapping[str, str]] = MappingProxyType(
     }
 )  # fmt: skip
 _HUNDREDTHS: Final = frozenset("cCeE")
-
-_TAKEOFF, _LAND = 22, 21
-_ACCEPTED: Final = (0, 5)
-_LANDINGS: Final[Mapping[float, str]] = MappingProxyType({11: "motors off", 18: "the landing"})
-_MODES: Final[Mapping[float, str]] = MappingProxyType(
-    {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
-)
-
-_WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"})
-_HINT: Final = "Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN)."
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,34 +50,20 @@ def is_dataflash(head: bytes) -> bool:
     return head.startswith(_SYNC + bytes([_FMT]))
 
 
-def read_dataflash(stream: BinaryIO) -> FlightLog:
-    """Read a whole log. Raises TrajectoryError if it contains no altitude."""
-    tables = read_tables(contents(stream), _WANTED)
-    time_s, channels, title = _altitude(tables)
-    if "BAT" in tables and {"TimeUS", "Volt"} <= tables["BAT"].keys():
-        battery = _first_instance(tables["BAT"])
-        if len(battery["TimeUS"]):
-            channels["battery_v"] = np.interp(time_s, _seconds(battery), numbers(battery["Volt"]))
-    starts, ends, landings = _moments(tables)
-    return FlightLog(
-        title=f"ArduPilot's on-board log, {title}",
-        clock="vehicle",
-        time_s=time_s,
-        channels=channels,
-        from_ground=True,
-        gain_sets=ARDUPILOT_SETS,
-        settings=tuple(_settings(tables)),
-        starts=starts,
-        ends=[*ends, *landings],
-        landings=landings,
-    )
+@dataclass(frozen=True, slots=True)
+class DataflashTables:
+    """Messages by name and column, in order of the file, and when the vehicle started anew within it, s.
 
-
-def read_tables(data: Contents, wanted: frozenset[str]) -> dict[str, Table]:
-    """Messages of the wanted types, by name and column; damaged sections are skipped.
-
-    Integers that represent hundredths are divided by 100; texts are bytes without trailing NULs.
+    Integers that represent hundredths are divided by 100; texts are bytes without trailing NULs. The clock (`TimeUS`)
+    of each boot goes on some time after that of the one before.
     """
+
+    tables: dict[str, Table]
+    boots_s: list[float]
+
+
+def read_tables(data: Contents, wanted: Collection[str]) -> DataflashTables:
+    """Messages of the wanted types; damaged sections are skipped."""
     kinds: dict[int, _Kind] = {}
     places: dict[int, array[int]] = {}
     lengths = [0] * 256
@@ -108,10 +86,38 @@ def read_tables(data: Contents, wanted: frozenset[str]) -> dict[str, Table]:
             if len(found) < _MAX_OF_A_TYPE:
                 found.append(position)
         position += length
-    return {kinds[number].name: _table(data, kinds[number], found) for number, found in places.items()}
+    tables = {kinds[number].name: _table(data, kinds[number], found) for number, found in places.items()}
+    timed = {kinds[number].name: np.array(found) for number, found in places.items()}
+    return _on_one_clock(tables, {name: found for name, found in timed.items() if "TimeUS" in tables[name]})
 
 
-def _define(body: bytes, lengths: list[int], kinds: dict[int, _Kind], wanted: frozenset[str]) -> None:
+def _on_one_clock(tables: dict[str, Table], places: Mapping[str, NDArray[np.uint64]]) -> DataflashTables:
+    """The tables by one clock for all boots; `places` are those of the rows of each table that has a clock. A row whose
+    time is far from that of the rows around it is damaged, and left out."""
+    if not places:
+        return DataflashTables(tables, [])
+    order = np.argsort(np.concatenate(list(places.values())), kind="stable")
+    time_us = np.concatenate([numbers(tables[name]["TimeUS"]) for name in places])[order]
+    before, now, after = time_us[:-2], time_us[1:-1], time_us[2:]
+    is_alone = (after >= before - _BACK_US) & ((now > after + _BACK_US) | (now < before - _BACK_US))
+    kept = np.flatnonzero(~np.pad(is_alone, 1)[: len(order)])
+    time_us = time_us[kept]
+    begins = np.flatnonzero(np.diff(time_us) < -_BACK_US) + 1
+    boots = np.split(time_us, begins)
+    for earlier, later in pairwise(boots):
+        np.add(later, np.fmax.reduce(earlier) + _BETWEEN_BOOTS_US - later[0], out=later)
+    if len(boots) > 1 or len(kept) < len(order):
+        counts = [len(each) for each in places.values()]
+        owner = np.repeat(np.arange(len(counts)), counts)[order][kept]
+        rows = np.concatenate([np.arange(each) for each in counts])[order][kept]
+        for number, name in enumerate(places):
+            mine = owner == number
+            columns = {column: values[rows[mine]] for column, values in tables[name].items()}
+            tables[name] = columns | {"TimeUS": time_us[mine]}
+    return DataflashTables(tables, [float(boot[0]) / 1e6 for boot in boots[1:]])
+
+
+def _define(body: bytes, lengths: list[int], kinds: dict[int, _Kind], wanted: Collection[str]) -> None:
     """Register the type in an FMT message: type, length, name[4], format[16], columns[64]; ignore invalid ones."""
     number, length = body[0], body[1]
     if number == _FMT or length < 3 or lengths[number]:
@@ -140,69 +146,9 @@ def parameters_in(tables: Mapping[str, Table]) -> Iterator[tuple[float, str, flo
     table = tables.get("PARM", {})
     if {"TimeUS", "Name", "Value"} <= table.keys():
         names = (_text(bytes(raw)) for raw in table["Name"])
-        yield from zip(_seconds(table).tolist(), names, numbers(table["Value"]).tolist(), strict=True)
+        time_s = numbers(table["TimeUS"]) / 1e6
+        yield from zip(time_s.tolist(), names, numbers(table["Value"]).tolist(), strict=True)
 
 
 def _text(raw: bytes) -> str:
     return raw.partition(b"\0")[0].decode("ascii", "replace")
-
-
-def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples], str]:
-    """Time, channels, and their source: the vertical controller's own message if it is logged."""
-    loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
-    if {"TimeUS", "PD"} <= loop.keys():
-        time_s = _seconds(loop)
-        down = {"altitude_m": "PD", "reference_m": "TPD", "climb_rate_m_s": "VD"}
-        channels = {channel: -numbers(loop[name]) for channel, name in down.items() if name in loop}
-        title = "altitude from PSCD.PD"
-    elif {"TimeUS", "Alt"} <= tuning.keys():
-        time_s = _seconds(tuning)
-        up = {"altitude_m": "Alt", "reference_m": "DAlt"}
-        channels = {channel: numbers(tuning[name]) for channel, name in up.items() if name in tuning}
-        title = "altitude from CTUN.Alt"
-    else:
-        raise refused("contains neither PSCD.PD nor CTUN.Alt, the altitude", _HINT)
-    if {"TimeUS", "ThO"} <= tuning.keys() and len(tuning["TimeUS"]):
-        channels["thrust"] = np.interp(time_s, _seconds(tuning), numbers(tuning["ThO"]))
-    return time_s, channels, title
-
-
-def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
-    """The gains, logged at the start of the log and at every change."""
-    names = names_in(ARDUPILOT_SETS)
-    for time_s, name, value in parameters_in(tables):
-        if name in names and np.isfinite(value):
-            yield Setting(time_s, name, value)
-
-
-def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
-    """Takeoff commands, events that end the flight, and landings."""
-    accepted = [
-        (time_s, command)
-        for time_s, command, result in rows_of(tables.get("MAVC", {}), "TimeUS", "Cmd", "Res")
-        if result in _ACCEPTED
-    ]
-    starts = [LogEvent(time_s, "the command NAV_TAKEOFF") for time_s, command in accepted if command == _TAKEOFF]
-    ends = [LogEvent(time_s, "the command NAV_LAND") for time_s, command in accepted if command == _LAND]
-    modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
-    ends += [
-        LogEvent(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
-        for (_, before), (time_s, mode) in pairwise(modes)
-        if mode != before
-    ]
-    landings = [
-        LogEvent(time_s, _LANDINGS[event])
-        for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id")
-        if event in _LANDINGS
-    ]
-    return starts, ends, landings
-
-
-def _first_instance(table: Table) -> Table:
-    """The first battery, if there are several."""
-    instance = next((table[name] for name in ("Inst", "Instance") if name in table), None)
-    return table if instance is None else {name: values[numbers(instance) == 0] for name, values in table.items()}
-
-
-def _seconds(table: Table) -> Samples:
-    return numbers(table["TimeUS"]) / 1e6

@@ -1,331 +1,126 @@
-"""Reader of telemetry logs (.tlog): both directions of a MAVLink connection, each frame preceded by its time in µs.
+"""Frames of telemetry logs (.tlog): both directions of a MAVLink connection, each preceded by its time in µs."""
 
-Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock, the takeoff from the ground station's
-command (a block with such a name, or else the one in which it lifted off; NAV_TAKEOFF, the takeoff mode), the gains
-from the vehicle's replies.
-"""
-
-import importlib
+import re
 import struct
-from array import array
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType, ModuleType
-from typing import BinaryIO, Final, Protocol
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from types import ModuleType
+from typing import Final
 
 import numpy as np
 
-from app.core.records.trajectory import THROTTLE_HOLDS_S, Samples
-from app.logs.base import (
-    ARDUPILOT_SETS,
-    PAPARAZZI,
-    PAPARAZZI_SETS,
-    PX4_SETS,
-    Contents,
-    GainSets,
-    contents,
-    names_in,
-    refused,
-)
-from app.logs.flight_parts import held
-from app.logs.takeoffs import FlightLog, LogEvent, Setting, Span, spans_of
-from app.logs.tlog_frames import frames, is_whole, payload_of
+from app.logs.base import Contents
 
-_POSITION: Final = struct.Struct("<I6f")
-_RESTART_S: Final = 1.0
-_ARMED: Final = 128
-_ACCEPTED: Final = (0, 5)
-_MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
-_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
-
-_HINT: Final = (
-    "Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
-    "contain the ground station's commands."
-)
-
-
-class _Message(Protocol):
-    """A message decoded by pymavlink: fields are attributes with the names in the dialect's definition."""
-
-    def get_srcSystem(self) -> int: ...  # noqa: N802 - pymavlink's name
-    def __getattr__(self, name: str) -> float | int | str: ...
+_STAMP_BYTES: Final = 8
+_MAGICS: Final = (0xFE, 0xFD)
+_MAGIC: Final = re.compile(rb"[\xfe\xfd]")
+_SIGNED: Final = 0x01
+_FIRST_US, _LAST_US = 631_152_000_000_000, 4_102_444_800_000_000
+"""Time stamps of the years 1990 … 2100."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Autopilot:
-    """Differences between autopilots.
+class Frame:
+    """Location of a frame: its first byte and the one past its last; its message number, sender and payload."""
 
-    `parameters` maps their parameter names to those of the gains. Some store gains as integers only; some have a
-    takeoff mode.
-    """
-
-    title: str
-    dialect_module: str
-    gain_sets: GainSets
-    parameters: Mapping[str, str]
-    from_ground: bool
-    keeps_whole_numbers: bool = False
-    has_takeoff_mode: bool = False
-
-    @property
-    def dialect(self) -> ModuleType:
-        """Loaded when the first log of such a vehicle is read, because a dialect contains a thousand classes."""
-        return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
-
-
-def _own_names(sets: GainSets) -> Mapping[str, str]:
-    return {name: name for name in names_in(sets)}
-
-
-_AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
-    {
-        9: _Autopilot(
-            "Paparazzi", "v10.paparazzi", PAPARAZZI_SETS, PAPARAZZI, from_ground=False, keeps_whole_numbers=True
-        ),
-        3: _Autopilot("ArduPilot", "v20.ardupilotmega", ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
-        12: _Autopilot("PX4", "v20.common", PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
-    }
-)
-"""By the autopilot number in the heartbeat.
-
-Paparazzi's altitude is above its local origin, that of the others above the ground.
-"""
-
-
-def read_tlog(stream: BinaryIO) -> FlightLog:
-    """Read a whole log. Raises TrajectoryError if it contains no flight of a known vehicle."""
-    data = contents(stream)
-    system, autopilot = _vehicle(data)
-    conversation = _Telemetry(autopilot, system)
-    dialect = autopilot.dialect
-    decoder = dialect.MAVLink(None)
-    extra = bytes([dialect.MAVLink_local_position_ned_message.crc_extra])
-    for frame in frames(data):
-        if frame.message == dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
-            if frame.system == system and is_whole(dialect, data, frame, extra):
-                conversation.position(payload_of(data, frame, _POSITION.size), frame.stamp_s(data))
-        elif frame.message in conversation.handlers:
-            try:
-                message: _Message = decoder.decode(bytearray(data[frame.start : frame.end]))
-            except dialect.MAVError:
-                continue
-            conversation.handlers[frame.message](message)
-    return conversation.log()
-
-
-def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
-    """The system that sends the first heartbeat of a known autopilot."""
-    for frame in frames(data):
-        if frame.message == 0 and frame.end - frame.payload >= 9:
-            autopilot = _AUTOPILOTS.get(data[frame.payload + 5])
-            if autopilot is not None:
-                return frame.system, autopilot
-    known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
-    raise refused(f"contains no MAVLink heartbeat of {known}", _HINT)
-
-
-@dataclass(slots=True)
-class _Sent:
-    """A command without an answer so far."""
-
-    moment: LogEvent
-    moments: list[LogEvent]
-
-
-@dataclass(slots=True)
-class _Telemetry:
-    """Messages of ground station and vehicle, in the vehicle's time, dated by the last position."""
-
-    autopilot: _Autopilot
+    start: int
+    end: int
+    message: int
     system: int
-    handlers: dict[int, Callable[[_Message], None]] = field(init=False)
-    _now_s: float = -np.inf
-    _offset_s: float = 0.0
-    _stamp_s: float = 0.0
-    _restarts: int = 0
-    _time_s: "array[float]" = field(default_factory=lambda: array("d"))
-    _altitude_m: "array[float]" = field(default_factory=lambda: array("d"))
-    _climb_rate_m_s: "array[float]" = field(default_factory=lambda: array("d"))
-    _battery: list[tuple[float, float]] = field(default_factory=list)
-    _throttle: list[tuple[float, float]] = field(default_factory=list)
-    _blocks: dict[int, str] = field(default_factory=dict)
-    _activated: list[tuple[float, int]] = field(default_factory=list)
-    _entered: list[tuple[float, int]] = field(default_factory=list)
-    _settings: list[Setting] = field(default_factory=list)
-    _asked: dict[str, float] = field(default_factory=dict)
-    _sent: dict[int, _Sent] = field(default_factory=dict)
-    _starts: list[LogEvent] = field(default_factory=list)
-    _ends: list[LogEvent] = field(default_factory=list)
-    _landings: list[LogEvent] = field(default_factory=list)
-    _armed: bool = False
-    _arming: list[tuple[float, bool]] = field(default_factory=list)
-    _heard_s: float = -np.inf
-    _mode: int | None = None
+    component: int
+    payload: int
 
-    def __post_init__(self) -> None:
-        by_name = {
-            "HEARTBEAT": self._heartbeat,
-            "SYS_STATUS": self._status,
-            "VFR_HUD": self._reported_throttle,
-            "SET_MODE": self._set_mode,
-            "PARAM_VALUE": self._parameter,
-            "PARAM_SET": self._parameter_asked,
-            "COMMAND_INT": self._command,
-            "COMMAND_LONG": self._command,
-            "COMMAND_ACK": self._answer,
-            "SCRIPT_ITEM": self._block,
-            "SCRIPT_CURRENT": self._block_entered,
-        }
-        dialect = self.autopilot.dialect
-        numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
-        self.handlers = {number: by_name[name] for name, number in numbers.items() if number is not None}
 
-    def position(self, payload: bytes, stamp_s: float) -> None:
-        boot_ms, _, _, down_m, _, _, down_m_s = _POSITION.unpack(payload)
-        now_s = boot_ms / 1000 + self._offset_s
-        if now_s < self._now_s - _RESTART_S:  # the vehicle's clock restarted: continue with the ground's
-            self._offset_s += self._now_s - now_s + max(stamp_s - self._stamp_s, 0.0)
-            now_s = boot_ms / 1000 + self._offset_s
-            self._restarts += 1
-        self._now_s, self._stamp_s = now_s, stamp_s
-        self._time_s.append(now_s)
-        self._altitude_m.append(-down_m)
-        self._climb_rate_m_s.append(-down_m_s)
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message without damage: its name, its sender, the ground's time, s, the bytes of the payload, and its fields by
+    their names in the dialect, those of an array as "q[0]"."""
 
-    def log(self) -> FlightLog:
-        """The log as read so far. Raises TrajectoryError if there was no position."""
-        if not self._time_s:
-            raise refused("contains no LOCAL_POSITION_NED of the vehicle", _HINT)
-        for sent in self._sent.values():  # a command without an answer counts as accepted
-            sent.moments.append(sent.moment)
-        for time_s, number in self._activated:
-            name = self._blocks.get(number, "")
-            moments = self._starts if "takeoff" in name.casefold().replace(" ", "").replace("_", "") else self._ends
-            moments.append(LogEvent(time_s, f"the block {name}" if name else f"block {number}"))
-        return FlightLog(
-            title=f"MAVLink log of {self.autopilot.title}",
-            clock="vehicle",
-            time_s=np.array(self._time_s),
-            channels=self._channels(),
-            from_ground=self.autopilot.from_ground,
-            gain_sets=self.autopilot.gain_sets,
-            settings=self._settings,
-            starts=self._starts,
-            ends=[*self._ends, *self._landings],
-            landings=self._landings,
-            armed=spans_of(self._arming) or None,
-            blocks=list(self._commanded_blocks()),
-            notes=tuple(self._notes()),
-        )
+    name: str
+    system: int
+    component: int
+    stamp_s: float
+    payload: bytes
+    fields: Mapping[str, float | bytes]
 
-    def _channels(self) -> dict[str, Samples]:
-        channels = {"altitude_m": np.array(self._altitude_m), "climb_rate_m_s": np.array(self._climb_rate_m_s)}
-        if self._battery:
-            times, volts = np.array(self._battery).T
-            channels["battery_v"] = np.interp(np.array(self._time_s), times, volts)
-        if self._throttle:
-            times, shares = np.array(self._throttle).T
-            channels["throttle"] = held(times, shares, np.array(self._time_s), longest_s=THROTTLE_HOLDS_S)
-        return channels
+    def __getitem__(self, field: str) -> float:
+        value = self.fields[field]
+        return np.nan if isinstance(value, bytes) else float(value)
 
-    def _notes(self) -> Iterator[str]:
-        if self._restarts:
-            yield f"the vehicle restarted and reset its clock ({self._restarts}×)"
-        for name, value in self._asked.items():
-            yield f"{name} was set to {value:g}, but the vehicle never confirmed it"
+    def text(self, field: str) -> str:
+        raw = self.fields[field]
+        return raw.partition(b"\0")[0].decode("ascii", "replace") if isinstance(raw, bytes) else ""
 
-    def _is_vehicle(self, message: _Message) -> bool:
-        return message.get_srcSystem() == self.system
 
-    def _heartbeat(self, message: _Message) -> None:
-        if not self._is_vehicle(message) or _AUTOPILOTS.get(int(message.autopilot)) is not self.autopilot:
-            return
-        armed, mode = bool(int(message.base_mode) & _ARMED), int(message.custom_mode)
-        if self._armed and not armed:
-            self._landings.append(LogEvent(self._now_s, "motors off"))
-        if self._mode not in {None, mode} and self._armed:
-            self._mode_changed(mode)
-        self._arming.append((self._heard_s if armed else self._now_s, armed))  # it armed since the heartbeat before
-        self._armed, self._mode, self._heard_s = armed, mode, self._now_s
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """Fields of a message on the wire, and the byte that its checksum begins with."""
 
-    def _mode_changed(self, mode: int) -> None:
-        main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
-        if self.autopilot.has_takeoff_mode and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
-            if sub == _PX4_TAKEOFF_MODE:
-                self._starts.append(LogEvent(self._now_s, "takeoff mode"))
-            return
-        self._ends.append(LogEvent(self._now_s, f"mode {sub or mode}"))
+    name: str
+    extra: bytes
+    unpacker: struct.Struct
+    fields: tuple[str, ...]
 
-    def _status(self, message: _Message) -> None:
-        millivolt = int(message.voltage_battery)
-        if self._is_vehicle(message) and 0 < millivolt < 0xFFFF and np.isfinite(self._now_s):
-            self._battery.append((self._now_s, millivolt / 1000))
 
-    def _reported_throttle(self, message: _Message) -> None:
-        percent = int(message.throttle)
-        if self._is_vehicle(message) and 0 <= percent <= 100 and np.isfinite(self._now_s):
-            self._throttle.append((self._now_s, percent / 100))
+def is_tlog(head: bytes) -> bool:
+    """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame."""
+    return (
+        len(head) > _STAMP_BYTES
+        and head[_STAMP_BYTES] in _MAGICS
+        and _FIRST_US <= int.from_bytes(head[:_STAMP_BYTES], "big") <= _LAST_US
+    )
 
-    def _set_mode(self, message: _Message) -> None:
-        if not self._is_vehicle(message):
-            self._ends.append(LogEvent(self._now_s, "SET_MODE"))
 
-    def _parameter(self, message: _Message) -> None:
-        name, value = str(message.param_id), float(message.param_value)
-        if not self._is_vehicle(message) or not np.isfinite(value):
-            return
-        if name in self.autopilot.parameters:
-            gain = self.autopilot.parameters[name]
-            self._settings.append(Setting(self._now_s, gain, value))
-            if self._asked.get(gain) == value:
-                del self._asked[gain]
-        elif name in ("kil_thr", "aut_kil_thr") and value:
-            self._landings.append(LogEvent(self._now_s, "motors off"))
-
-    def _parameter_asked(self, message: _Message) -> None:
-        name, value = str(message.param_id), float(message.param_value)
-        if name in self.autopilot.parameters and not self._is_vehicle(message) and np.isfinite(value):
-            kept = float(int(value)) if self.autopilot.keeps_whole_numbers else value
-            self._asked[self.autopilot.parameters[name]] = kept
-
-    def _command(self, message: _Message) -> None:
-        if self._is_vehicle(message):
-            return
-        number = int(message.command)
-        takeoff = number == _TAKEOFF or (
-            number == _SET_MODE and self.autopilot.has_takeoff_mode and message.param3 == _PX4_TAKEOFF_MODE
-        )
-        lands = number == _LAND or (number == _MOTORS and not message.param1)
-        if takeoff:
-            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_command_name(number)}"), self._starts)
-        elif lands or number == _SET_MODE:
-            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_command_name(number)}"), self._ends)
-
-    def _answer(self, message: _Message) -> None:
-        sent = self._sent.pop(int(message.command), None) if self._is_vehicle(message) else None
-        if sent is not None and message.result in _ACCEPTED:
-            sent.moments.append(sent.moment)
-
-    def _block(self, message: _Message) -> None:
-        if self._is_vehicle(message):
-            self._blocks[int(message.seq)] = str(message.name)
+def frames(data: Contents) -> Iterator[Frame]:
+    """Every frame that is followed by another one, or by the log's end; damaged parts are skipped."""
+    position, size = _STAMP_BYTES, len(data)
+    while position + 12 <= size:
+        frame = _frame_at(data, position, size)
+        if frame is None:
+            found = _MAGIC.search(data, position + 1)
+            position = found.start() if found else size
         else:
-            self._activated.append((self._now_s, int(message.seq)))
-
-    def _block_entered(self, message: _Message) -> None:
-        if self._is_vehicle(message):
-            self._entered.append((self._now_s, int(message.seq)))
-
-    def _commanded_blocks(self) -> Iterator[Span]:
-        """Every stay in a block that the vehicle entered on command, from the command to that of another one."""
-        before_s = -np.inf
-        for entered_s, number in self._entered:
-            sent_s = [at_s for at_s, sent in self._activated if sent == number and before_s < at_s <= entered_s]
-            others_s = (at_s for at_s, other in (*self._entered, *self._activated) if other != number)
-            if sent_s:
-                yield Span(sent_s[-1], min((at_s for at_s in others_s if at_s >= entered_s), default=np.inf))
-            before_s = entered_s
+            yield frame
+            position = frame.end + _STAMP_BYTES
 
 
-def _command_name(command: int) -> str:
-    return {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}[command]
+def messages(data: Contents, dialect: ModuleType, names: Collection[str]) -> Iterator[Message]:
+    """Every message with one of these names and a correct checksum, of any sender."""
+    numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in names}
+    layouts = {number: _layout(dialect, name) for name, number in numbers.items() if number is not None}
+    for frame in frames(data):
+        layout = layouts.get(frame.message)
+        if layout is None:
+            continue
+        past = frame.payload + data[frame.start + 1]
+        checksum = int.from_bytes(data[past : past + 2], "little")
+        if dialect.x25crc(data[frame.start + 1 : past] + layout.extra).crc == checksum:
+            size = layout.unpacker.size  # MAVLink 2 truncates trailing zeros
+            payload = data[frame.payload : past][:size].ljust(size, b"\0")
+            fields = dict(zip(layout.fields, layout.unpacker.unpack(payload), strict=True))
+            stamp_s = int.from_bytes(data[frame.start - _STAMP_BYTES : frame.start], "big") / 1e6
+            yield Message(layout.name, frame.system, frame.component, stamp_s, payload, fields)
+
+
+def _layout(dialect: ModuleType, name: str) -> _Layout:
+    defined = getattr(dialect, f"MAVLink_{name.lower()}_message")
+    lengths = zip(defined.ordered_fieldnames, defined.lengths, strict=True)
+    fields = ([field] if length == 1 else [f"{field}[{place}]" for place in range(length)] for field, length in lengths)
+    return _Layout(name, bytes([defined.crc_extra]), defined.unpacker, tuple(chain.from_iterable(fields)))
+
+
+def _frame_at(data: Contents, start: int, size: int) -> Frame | None:
+    magic, length = data[start], data[start + 1]
+    if magic == 0xFE:
+        end, payload, sender, message = start + 8 + length, start + 6, start + 3, data[start + 5]
+    elif magic == 0xFD:
+        end, payload, sender = start + 12 + length, start + 10, start + 5
+        end += 13 if data[start + 2] & _SIGNED else 0
+        message = int.from_bytes(data[start + 7 : start + 10], "little")
+    else:
+        return None
+    following = end + _STAMP_BYTES
+    if end > size or (following < size and data[following] not in _MAGICS):
+        return None
+    return Frame(start, end, message, data[sender], data[sender + 1], payload)

@@ -1,7 +1,7 @@
-"""Reader of recorded runs of the loops of ArduCopter and PX4: CSV, optionally gzipped, one row per step.
+"""Recorded runs of a control loop: CSV, optionally gzipped, one row per step.
 
-Line 1 is `# ` and a JSON object that describes the run, line 2 the header, then come rows of numbers; an empty field is
-NaN.
+Of a described run, line 1 is `# ` and a JSON object that describes it, line 2 the header, then come rows of numbers; an
+empty field is NaN.
 """
 
 import csv
@@ -11,20 +11,27 @@ import json
 import tempfile
 import zlib
 from array import array
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
-from app.logs.loop_trace import GZIP, IN_MEMORY_BYTES, MAX_ROWS, unpack
 
+MAX_ROWS: Final = 1_000_000
+MAX_BYTES: Final = 256 * 2**20
+GZIP: Final = b"\x1f\x8b"
+_IN_MEMORY_BYTES: Final = 2**22
 _DESCRIPTION_CHARACTERS: Final = 2**16
+_GZIP_WINDOW: Final = 31
 _FIRST_ROW: Final = 3
 """Line of the first row."""
+
+Number = TypeVar("Number", int, float)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +58,13 @@ class TraceChecks:
 
     def malformed(self, field: str, reason: str) -> InputError:
         return InputError(f"{self.name} cannot be replayed.", hint=self.hint, problems=(Problem(field, reason),))
+
+    def damaged(self, error: Exception) -> InputError:
+        return InputError(
+            f"{self.name} is damaged or not a text file: {error}.",
+            hint=self.hint,
+            problems=(Problem("file", "is damaged or not a text file"),),
+        )
 
     def require_flags(self, table: TraceTable, columns: Collection[str]) -> None:
         for column in columns:
@@ -83,10 +97,76 @@ class TraceChecks:
 
 
 def has_columns(beginning: bytes, columns: Collection[str]) -> bool:
-    """Whether text with this beginning is such a run with at least these columns."""
-    first, _, rest = beginning.partition(b"\n")
+    """Whether a file with this beginning, plain or gzipped, is such a run with at least these columns."""
+    first, _, rest = _unzipped(beginning).partition(b"\n")
     header = rest.partition(b"\n")[0].decode("utf-8", "replace")
     return first.startswith(b"#") and set(columns) <= {name.strip() for name in header.split(",")}
+
+
+def _unzipped(head: bytes) -> bytes:
+    """The beginning of the file that is gzipped into one with this head; the head itself if it is not gzipped."""
+    try:
+        return zlib.decompressobj(_GZIP_WINDOW).decompress(head)
+    except zlib.error:
+        return head
+
+
+def is_zipped(stream: BinaryIO) -> bool:
+    """Whether the stream begins as a gzipped file; it is at its beginning afterwards."""
+    stream.seek(0)
+    first = stream.read(len(GZIP))
+    stream.seek(0)
+    return first == GZIP
+
+
+@contextmanager
+def text_of(checks: TraceChecks, stream: BinaryIO, *, zipped: bool) -> Iterator[io.TextIOWrapper]:
+    """The text of a run, decompressed to a bounded size: a small file may expand to a huge one. Raises InputError, also
+    while it is read, if it is damaged."""
+    source = gzip.GzipFile(fileobj=stream, mode="rb") if zipped else stream
+    try:
+        with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as plain:
+            while chunk := source.read(2**20):
+                plain.write(chunk)
+                if plain.tell() > MAX_BYTES:
+                    raise InputError(
+                        f"{checks.name} cannot be replayed.",
+                        hint=f"Trim the run: at most {MAX_BYTES // 2**20} MiB of text and {MAX_ROWS} rows can be read.",
+                        problems=(Problem("file", f"contains more than {MAX_BYTES // 2**20} MiB of text"),),
+                    )
+            plain.seek(0)
+            with io.TextIOWrapper(plain, encoding="utf-8", newline="") as text:
+                yield text
+    except (EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
+        raise checks.damaged(error) from error
+
+
+def read_rows(
+    checks: TraceChecks,
+    rows: Iterator[list[str]],
+    header: Sequence[str],
+    value: Callable[[str, str], Number],
+    *,
+    first_line: int,
+) -> Iterator[Number]:
+    """The values of all rows; `value` makes one of a column and its text, and raises ValueError with a reason. Raises
+    InputError naming the line and the column of the first error, or if there is no row."""
+    line = first_line - 1
+    for line, row in enumerate(rows, start=first_line):
+        if line >= MAX_ROWS + first_line:
+            raise checks.malformed(f"line {line}, {header[0]}", f"a trace may have at most {MAX_ROWS} rows")
+        if len(row) != len(header):
+            column = header[min(len(row), len(header) - 1)]
+            raise checks.malformed(f"line {line}, {column}", f"the row has {len(row)} values, the header {len(header)}")
+        for column, text in zip(header, row, strict=True):
+            try:
+                yield value(column, text)
+            except ValueError as error:
+                raise checks.malformed(f"line {line}, {column}", str(error)) from error
+    if line < first_line:
+        raise InputError(
+            f"{checks.name} has a header and no rows.", hint=checks.hint, problems=(Problem("file", "has no rows"),)
+        )
 
 
 def read_trace_table(
@@ -96,77 +176,49 @@ def read_trace_table(
 
     Raises InputError naming the line and the column of the first error.
     """
-    stream.seek(0)
-    zipped = stream.read(len(GZIP)) == GZIP
-    stream.seek(0)
+    hint = f"A trace has # and a JSON object, the columns {','.join(columns)}, and one row of numbers per step."
+    checks = TraceChecks(name, hint)
     try:
-        with tempfile.SpooledTemporaryFile(IN_MEMORY_BYTES) as plain:
-            unpack(name, gzip.GzipFile(fileobj=stream, mode="rb") if zipped else stream, plain)
-            with io.TextIOWrapper(plain, encoding="utf-8", newline="") as text:
-                return _read(name, text, columns, frozenset(may_be_empty))
-    except (EOFError, zlib.error, UnicodeDecodeError, csv.Error, gzip.BadGzipFile) as error:
-        raise InputError(
-            f"{name} is damaged or not a text file: {error}.",
-            hint=_hint(columns),
-            problems=(Problem("file", "is damaged or not a text file"),),
-        ) from error
+        with text_of(checks, stream, zipped=is_zipped(stream)) as text:
+            return _read(checks, text, columns, frozenset(may_be_empty))
+    except gzip.BadGzipFile as error:
+        raise checks.damaged(error) from error
 
 
-def _read(name: str, text: io.TextIOWrapper, columns: Collection[str], may_be_empty: frozenset[str]) -> TraceTable:
-    description = _description(name, text.readline(_DESCRIPTION_CHARACTERS), columns)
+def _read(
+    checks: TraceChecks, text: io.TextIOWrapper, columns: Collection[str], may_be_empty: frozenset[str]
+) -> TraceTable:
+    description = _description(checks, text.readline(_DESCRIPTION_CHARACTERS))
     reader = csv.reader(text)
     header = next(reader, [])
     if missing := tuple(Problem(f"line 2, {each}", "column is missing") for each in columns if each not in header):
-        raise InputError(f"{name} is not a trace of this loop.", hint=_hint(columns), problems=missing)
+        raise InputError(f"{checks.name} is not a trace of this loop.", hint=checks.hint, problems=missing)
     if twice := next((each for each in header if header.count(each) > 1), None):
-        raise _malformed(name, 2, twice, "column appears twice", columns)
-    values = array("d")
-    for line, row in enumerate(reader, start=_FIRST_ROW):
-        values.extend(_row(name, line, header, row, may_be_empty, columns))
-    if not values:
-        raise InputError(
-            f"{name} has a header and no rows.", hint=_hint(columns), problems=(Problem("file", "has no rows"),)
-        )
+        raise checks.malformed(f"line 2, {twice}", "column appears twice")
+
+    def value(column: str, text: str) -> float:
+        return np.nan if not text and column in may_be_empty else _finite(text)
+
+    values = array("d", read_rows(checks, reader, header, value, first_line=_FIRST_ROW))
     table = np.array(values).reshape(-1, len(header))
     return TraceTable(description, {each: np.ascontiguousarray(table[:, k]) for k, each in enumerate(header)})
 
 
-def _description(name: str, line: str, columns: Collection[str]) -> Mapping[str, object]:
+def _description(checks: TraceChecks, line: str) -> Mapping[str, object]:
     try:
         read: object = json.loads(line.removeprefix("#"))
     except (ValueError, RecursionError):
         read = None
     if not line.startswith("#") or not isinstance(read, dict):
-        raise _malformed(name, 1, "description", "must be # and a JSON object", columns)
+        raise checks.malformed("line 1, description", "must be # and a JSON object")
     return read
 
 
-def _row(
-    name: str, line: int, header: Sequence[str], row: list[str], may_be_empty: frozenset[str], columns: Collection[str]
-) -> Iterator[float]:
-    if line > MAX_ROWS + 2:
-        raise _malformed(name, line, header[0], f"a trace may have at most {MAX_ROWS} rows", columns)
-    if len(row) != len(header):
-        column = header[min(len(row), len(header) - 1)]
-        reason = f"the row has {len(row)} values, the header {len(header)}"
-        raise _malformed(name, line, column, reason, columns)
-    for column, text in zip(header, row, strict=True):
-        if not text and column in may_be_empty:
-            yield np.nan
-            continue
-        try:
-            value = float(text)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            raise _malformed(name, line, column, f"must be a finite number, got {text[:40]!r}", columns)
-        yield value
-
-
-def _hint(columns: Collection[str]) -> str:
-    return f"A trace has # and a JSON object, the columns {','.join(columns)}, and one row of numbers per step."
-
-
-def _malformed(name: str, line: int, column: str, reason: str, columns: Collection[str]) -> InputError:
-    problems = (Problem(f"line {line}, {column}", reason),)
-    return InputError(f"{name} cannot be replayed.", hint=_hint(columns), problems=problems)
+def _finite(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise ValueError(f"must be a finite number, got {text[:40]!r}")
+    return value

@@ -9,13 +9,13 @@ from typing import Final, Protocol
 
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.campaigns.history import FLOWN
 from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
-from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
 from app.core.policy import Gain, Gains

@@ -138,7 +138,7 @@ def fly_campaign(title: str, published: tuple[Run, ...], fly: Callable[[Gains], 
     definition = CAMPAIGNS[title]
     flights: list[Flight] = []
     while True:
-        proposal = next_proposal(definition, flights)
+        proposal = next_proposal(definition, _TAKEOFF, flights)
         verdict = evaluate_stop_rule(definition, flights, proposal)
         if verdict.reason is not None:
             break

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.paparazzi.trace import read_loop_trace
 from app.core.control.paparazzi import OUTPUTS, RATE_HZ, LoopTrace, Replay, compared, replayed
 from app.figures.panels import Panel, Plot
-from app.logs.loop_trace import read_loop_trace
 from app.reproductions.results import Progress, Result, Row, curve
 
 RECORDED_TAKEOFF: Final = Path(__file__).parent / "data" / "takeoff_default.csv.gz"

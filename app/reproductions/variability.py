@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.experiments import get_experiment
 from app.core.definition import flight_seed
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Matrix, Scatter
 from app.core.formatting import number, short_percent
 from app.core.policy import Vector

@@ -9,11 +9,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from app.autopilots.dialects import Codec
+from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, OutgoingMessage, SimulatedAutopilot
 from app.core.clock import Clock
-from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Autopilot, Body, OutgoingMessage
 from app.simdrone.faults import Faults, PlannedFault
 from app.simdrone.motion_capture import MocapOutput, MotionCapture
-from app.vehicles.mavlink.dialects import Codec
 from app.vehicles.mavlink.transports import Peer, Transport
 
 BOOT_S: Final = 2.0
@@ -27,7 +27,7 @@ class Drone:
     def __init__(
         self,
         body: Body,
-        switch_on: Callable[[Body], Autopilot],
+        switch_on: Callable[[Body], SimulatedAutopilot],
         faults: Sequence[PlannedFault] = (),
         outlet: MocapOutput | None = None,
     ) -> None:

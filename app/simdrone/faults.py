@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import ClassVar, Final, Protocol
 
+from app.autopilots.dialects import FieldValue
+from app.autopilots.simulated.body import TICK_S, Body, Fields, OutgoingMessage, SimulatedAutopilot
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
-from app.simdrone.body import TICK_S, Autopilot, Body, Fields, OutgoingMessage
 from app.simdrone.motion_capture import MotionCapture
-from app.vehicles.mavlink.dialects import FieldValue
 
 CONNECT: Final = "connect"
 FORM: Final = "NAME[:DURATION]@T, T in seconds after the takeoff command, or NAME[:DURATION]@connect"
@@ -36,7 +36,7 @@ class FaultTarget(Protocol):
     """Parts of a drone that a fault can change."""
 
     body: Body
-    autopilot: Autopilot
+    autopilot: SimulatedAutopilot
     cameras: MotionCapture
 
     def reboot(self) -> None: ...

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from app.simdrone.body import OutgoingMessage
-from app.vehicles.mavlink.dialects import COMMON, FieldValue
+from app.autopilots.dialects import COMMON, FieldValue
+from app.autopilots.simulated.body import OutgoingMessage
 from app.vehicles.mavlink.transports import LinkError, Transport, open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, SourceAddress, StreamAddress
 

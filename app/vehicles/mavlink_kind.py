@@ -1,11 +1,14 @@
-"""The kind `mavlink`: vehicles with Paparazzi, ArduCopter or PX4, controlled over a MAVLink link."""
+"""The kind `mavlink`: vehicles with one of the registered autopilots, controlled over a MAVLink link."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from app.autopilots.autopilot import Autopilot
+from app.autopilots.gains import check_gains
+from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import ScaledClock
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
@@ -20,14 +23,30 @@ from app.vehicles.base import (
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import check_gains
 from app.vehicles.mocap import addresses as sources
 
 if TYPE_CHECKING:
     from app.vehicles.mavlink.vehicle import MavlinkVehicle
 
 SCORED: Final = ("vehicle", "mocap")
+
+_PLANNED: Final = tuple(each for each in AUTOPILOTS.values() if each.flying_blocks)
+"""Autopilots that fly by a flight plan on board, which lands the vehicle after its own time limit."""
+_SIGNING: Final = tuple(each for each in AUTOPILOTS.values() if each.dialect.can_sign)
+_DEFAULT: Final = next(iter(AUTOPILOTS.values()))
+
+
+def _names(autopilots: Iterable[Autopilot]) -> tuple[str, ...]:
+    return tuple(each.name for each in autopilots)
+
+
+def _titles(autopilots: Iterable[Autopilot]) -> str:
+    return ", ".join(each.title for each in autopilots)
+
+
+def _choice(names: Iterable[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} or {last}"
 
 
 def is_simulated(options: Options, simulation_hosts: Hosts = HERE) -> bool:
@@ -82,23 +101,25 @@ def _open(
 
 
 def _longest_window_s(options: Options) -> float:
-    """Under Paparazzi the flight plan on board lands the vehicle after its own time limit."""
-    if options["autopilot"] != "paparazzi":
+    if options["autopilot"] not in _names(_PLANNED):
         return math.inf
     return float(options["plan_time_s"]) - RECORDED_BEYOND_S - LAND_COMMAND_S
 
 
 def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]:
     problems = []
-    if options["autopilot"] not in PROFILES:
-        problems.append(Problem("autopilot", f"must be {', '.join(PROFILES)}, got {options['autopilot']}"))
+    autopilot = AUTOPILOTS.get(str(options["autopilot"]))
+    if autopilot is None:
+        problems.append(Problem("autopilot", f"must be {', '.join(AUTOPILOTS)}, got {options['autopilot']}"))
     try:
         address = addresses.parse(str(options["address"]))
-        if options["autopilot"] == "paparazzi" and isinstance(address, UdpAddress) and address.local_port is None:
+        if autopilot and autopilot.sends_to_port and isinstance(address, UdpAddress) and address.local_port is None:
+            usual = autopilot.address.rpartition("@")[2]
             problems.append(
                 Problem(
                     "address",
-                    f"must name the port of this computer that Paparazzi sends to: {address}@LOCALPORT, usually @4244",
+                    f"must name the port of this computer that {autopilot.title} sends to: {address}@LOCALPORT, "
+                    f"usually @{usual}",
                 )
             )
         if options["simulated"] and not _may_simulate(address, simulation_hosts):
@@ -107,10 +128,9 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
     except InputError as error:
         problems += error.problems
     problems += _second_source_problems(str(options["second_source"]), str(options["scored_source"]))
-    if options["signing_key_file"] and options["autopilot"] == "paparazzi":
-        problems.append(
-            Problem("signing_key_file", "is not supported: Paparazzi uses MAVLink 1, which has no signatures")
-        )
+    if options["signing_key_file"] and autopilot and not autopilot.dialect.can_sign:
+        reason = f"is not supported: {autopilot.title} uses MAVLink 1, which has no signatures"
+        problems.append(Problem("signing_key_file", reason))
     if options["clock_speed"] != 1.0 and not options["simulated"]:
         problems.append(Problem("clock_speed", "must be 1: a real vehicle flies in real time"))
     return tuple(problems)
@@ -118,11 +138,11 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
 
 def _experiments(options: Options) -> tuple[str, ...]:
     """Return the experiments whose gains the autopilot has."""
-    return PROFILES[str(options["autopilot"])].experiments
+    return tuple(each.name for each in AUTOPILOTS[str(options["autopilot"])].experiments)
 
 
 def _check_gains(options: Options, gains: Gains) -> None:
-    check_gains(gains, PROFILES[str(options["autopilot"])].gain_sets[0])
+    check_gains(gains, AUTOPILOTS[str(options["autopilot"])].gain_sets[0])
 
 
 def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
@@ -137,66 +157,63 @@ def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
     return ()
 
 
-_PAPARAZZI: Final = ("paparazzi",)
-
 MAVLINK: Final = VehicleKind(
     name="mavlink",
     title="Vehicle over MAVLink",
-    line="A real vehicle with Paparazzi, ArduCopter or PX4, or a simulated one with the same protocol.",
+    line=f"A real vehicle with {_choice(each.title for each in AUTOPILOTS.values())}, or a simulated one with the same "
+    "protocol.",
     is_real=True,
     can_fly=True,
-    experiments=tuple(name for profile in PROFILES.values() for name in profile.experiments),
+    experiments=tuple(dict.fromkeys(each.name for autopilot in AUTOPILOTS.values() for each in autopilot.experiments)),
     options=(
-        VehicleOption(
-            "autopilot", "Autopilot: paparazzi, ardupilot or px4", "", "paparazzi", label="Kind of autopilot"
-        ),
+        VehicleOption("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", "", _DEFAULT.name, label="Kind of autopilot"),
         VehicleOption(
             "address",
             "Address of the vehicle: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
             "",
-            "udp:127.0.0.1:4245@4244",
+            _DEFAULT.simulated_address,
             label="Address",
         ),
         VehicleOption("simulated", "Simulated vehicle on this computer", "", False),
         VehicleOption("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
         VehicleOption(
             "aircraft_id",
-            "Paparazzi's aircraft id (AC_ID); 0: the same as the system id",
+            f"{_titles(_PLANNED)}'s aircraft id (AC_ID); 0: the same as the system id",
             "",
             0.0,
             0.0,
             255.0,
-            autopilots=_PAPARAZZI,
+            autopilots=_names(_PLANNED),
         ),
         VehicleOption("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
         VehicleOption(
             "climb_waypoint",
-            "Paparazzi: number of the waypoint that the takeoff climbs to",
+            f"{_titles(_PLANNED)}: number of the waypoint that the takeoff climbs to",
             "",
             2.0,
             1.0,
             254.0,
-            autopilots=_PAPARAZZI,
+            autopilots=_names(_PLANNED),
         ),
         VehicleOption("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
         VehicleOption("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
         VehicleOption(
             "plan_radius_m",
-            "Paparazzi: maximum distance from HOME in the flight plan",
+            f"{_titles(_PLANNED)}: maximum distance from HOME in the flight plan",
             "m",
             8.0,
             0.5,
             1000.0,
-            autopilots=_PAPARAZZI,
+            autopilots=_names(_PLANNED),
         ),
         VehicleOption(
             "plan_time_s",
-            "Paparazzi: time limit of the flight plan's takeoff",
+            f"{_titles(_PLANNED)}: time limit of the flight plan's takeoff",
             "s",
             45.0,
             15.0,
             600.0,
-            autopilots=_PAPARAZZI,
+            autopilots=_names(_PLANNED),
         ),
         VehicleOption("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
@@ -209,11 +226,11 @@ MAVLINK: Final = VehicleKind(
         VehicleOption("scored_source", "Scored source of altitude", "", "vehicle", choices=SCORED),
         VehicleOption(
             "signing_key_file",
-            "ArduCopter, PX4: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
+            f"{_titles(_SIGNING)}: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
             "",
             "",
             label="Signing key file",
-            autopilots=("ardupilot", "px4"),
+            autopilots=_names(_SIGNING),
         ),
         VehicleOption(
             "log_folder",

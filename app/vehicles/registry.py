@@ -6,6 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NoReturn
 
+from app.autopilots.registry import AUTOPILOTS
 from app.core.errors import GainlineError, InputError, Problem
 from app.core.formatting import format_gains
 from app.core.policy import Gains
@@ -31,7 +32,7 @@ IMPORT: Final = VehicleKind(
     line="You fly the proposed gains on your own vehicle and upload its log, or the altitude as CSV.",
     is_real=True,
     can_fly=False,
-    experiments=("takeoff", "takeoff-ardupilot", "takeoff-px4"),
+    experiments=tuple(dict.fromkeys(each.experiments[0].name for each in AUTOPILOTS.values())),
     options=(),
     open=_open,
 )

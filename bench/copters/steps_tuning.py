@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.experiments import experiment_of
 from app.core.analysis.margin import RINGING_DAMPING
 from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import TrajectoryError
@@ -151,7 +152,7 @@ def calibrated(tuning: StepsTuning) -> dict[str, object]:
             history.append(flight)
             if len(history) == CAMPAIGN_FLIGHTS:
                 break
-            proposal = next_proposal(definition, history)
+            proposal = next_proposal(definition, experiment_of(definition), history)
         except TrajectoryError as refused:
             tuning.ended = str(refused)
             break

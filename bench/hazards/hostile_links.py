@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
+from app.autopilots.dialects import Codec, Dialect, FieldValue, Message, number
 from app.simdrone.drone import Drone
-from app.vehicles.mavlink.dialects import Codec, Dialect, FieldValue, Message, number
 
 COMPANION: Final = 191
 ONBOARD_CONTROLLER: Final = 18

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Final, Protocol
 
+from app.autopilots.dialects import number
 from app.simdrone.drone import BOOT_S
-from app.vehicles.mavlink.dialects import number
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE
 from bench.hazards.hostile_links import (
     FIELDS,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
-from app.simdrone.copter import Copter
+from app.autopilots.simulated.copter import Copter
 from app.simdrone.drone import BOOT_S
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.transports import Peer

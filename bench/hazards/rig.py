@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from app.autopilots.dialects import FieldValue
 from app.simdrone.body import new_body
 from app.simdrone.drone import BOOT_S, Drone, Lockstep
 from app.simdrone.motion_capture import VehicleLinkOutput
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.mavlink_kind import MAVLINK
 from bench.hazards.cases import (
     ABORT,

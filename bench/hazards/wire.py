@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Final
 
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, Message, number, text
+from app.autopilots.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, Message, number, text
 
 
 class Command(StrEnum):

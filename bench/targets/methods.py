@@ -17,6 +17,7 @@ from unittest.mock import patch
 import numpy as np
 from scipy.optimize import minimize
 
+from app.autopilots.experiments import EXPERIMENTS, experiment_of
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector
@@ -217,7 +218,7 @@ def _campaign(strategy: str, options: Mapping[str, OptionValue], start: StartKin
         definition = _definition(strategy, options, tuning, start)
         history: list[Flight] = []
         while True:
-            proposal = next_proposal(definition, history)
+            proposal = next_proposal(definition, experiment_of(definition), history)
             if proposal.kind == "none":
                 tuning.settle(SPACE.vector(proposal.gains), "nothing better")
                 return
@@ -239,7 +240,7 @@ def _definition(strategy: str, options: Mapping[str, OptionValue], tuning: Tunin
         stop=StopRule(kind="budget", max_flights=tuning.budget),
         seed=tuning.campaign_seed,
     )
-    check_definition(definition)
+    check_definition(definition, EXPERIMENTS)
     return definition
 
 

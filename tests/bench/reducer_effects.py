@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import product
 
-from app.vehicles.mavlink.events import (
+from app.autopilots.measurements import (
     Attitude,
     Battery,
     CommandReply,

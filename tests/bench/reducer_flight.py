@@ -3,15 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import DISARMING, CommandReply, Measurement, Parameter
 from app.vehicles.mavlink.events import (
-    DISARMING,
-    Action,
     ActionDone,
     Command,
-    CommandReply,
     GainsRestored,
-    Measurement,
-    Parameter,
     PerformAction,
     RestoreGains,
     SecondaryAltitudeReceived,

@@ -7,7 +7,7 @@ from typing import Final
 
 import pytest
 
-from app.vehicles.mavlink.dialects import FieldValue
+from app.autopilots.dialects import FieldValue
 from bench.hazards.cases import CELLS, FOR_GOOD_S, SAFE, TUNED, WILD_GAINS, Case, PlannedFault, draw
 from bench.hazards.fault_checks import find_violations
 from bench.hazards.fault_trial import TrialResult

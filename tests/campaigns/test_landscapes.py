@@ -7,12 +7,13 @@ from fastapi.testclient import TestClient
 
 from app.campaigns import landscapes, tasks
 from app.campaigns.tasks import LandscapeJob
-from app.core.tuning.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
 from tests.builders import WORKER, create_campaign, create_flown_campaign, create_flown_trial, get
+from tests.core.tuning.defined import plan_grid
 
 Json = dict[str, Any]
 

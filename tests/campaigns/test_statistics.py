@@ -105,6 +105,7 @@ def test_one_sentence_each_says_how_the_error_with_the_same_gains_has_changed_in
         battery_v = np.full(len(record.trajectory), volts)
         trajectory = replace(record.trajectory, channels={**record.trajectory.channels, "battery_v": battery_v})
         land(database, lift_off(database), replace(record, trajectory=trajectory))
+    fly(client, database, campaign["id"], 2.5, gains=OTHER)
     found = get(client, f"/api/campaigns/{campaign['id']}/statistics")
     drift, trend = found["drift"], found["battery_trend"]
     assert (drift["first_trial"], drift["last_trial"], drift["resolved"]) == (1, 4, True)

@@ -15,16 +15,16 @@ from typing import IO, Final
 import pytest
 from typer.testing import CliRunner
 
+from app.autopilots.dialects import number, text
+from app.autopilots.px4.simulated import Px4
+from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.copter_parameters import Parameters
 from app.campaigns.campaign_files import read_preset
 from app.cli.commands import app
 from app.core.clock import ScaledClock
-from app.simdrone.copter_parameters import Parameters
-from app.simdrone.px4 import Px4
 from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse
-from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.profiles import PROFILES
 from tests.ports import free_port
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.speaking import LOOPBACK
@@ -69,7 +69,7 @@ def drone(autopilot: str) -> Iterator[str]:
 def held_by(address: str, profile: str, names: Mapping[str, float]) -> dict[str, float]:
     """What the vehicle says it holds, asked as any ground station asks."""
     found: dict[str, float] = {}
-    with Link(parse(address), PROFILES[profile].dialect, clock=ScaledClock(1.0)) as link:
+    with Link(parse(address), AUTOPILOTS[profile].dialect, clock=ScaledClock(1.0)) as link:
 
         def ask() -> None:
             for name in names.keys() - found.keys():

@@ -16,6 +16,7 @@ from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI
+from app.autopilots.readers import read_takeoff
 from app.campaigns import landscapes, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
@@ -26,7 +27,7 @@ from app.campaigns.trials.schemas import Classification, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
-from app.core.tuning.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import predict_points
 from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registration
@@ -40,6 +41,7 @@ from app.vehicles.base import FlightOptions
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
+from tests.core.tuning.defined import plan_grid
 
 T = TypeVar("T")
 Json = dict[str, Any]
@@ -124,7 +126,7 @@ class States:
         def upload(session: Session) -> int:
             proposal = _proposed(session, campaign_id)
             trial = trials.create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
-            flown = records.read_record(io.BytesIO(csv(proposal.gains)), name="flight.csv")
+            flown = read_takeoff(io.BytesIO(csv(proposal.gains)), name="flight.csv")
             records.import_record(session, trial.id, flown)
             _propose(session, campaign_id)
             return trial.id

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from app.autopilots.dialects import PAPARAZZI, Message
 from app.common.data_folder import telemetry_log
 from app.common.states import ActKind
 from app.flights import connection_process as vehicle_process_module
@@ -37,7 +38,6 @@ from app.flights.process_messages import (
 from app.vehicles.base import Identity
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink.dialects import PAPARAZZI, Message
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from bench.hazards.hostile_links import MessageForger

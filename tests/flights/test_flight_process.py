@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.experiments import get_experiment
 from app.common.data_folder import vehicle_lock
-from app.core.experiments import get_experiment
 from app.flights.flight_loop import FlightMonitor
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged

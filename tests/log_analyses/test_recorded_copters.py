@@ -7,21 +7,19 @@ from functools import cache
 
 import pytest
 
+from app.autopilots.readers import reader_of
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
-from app.logs.ardupilot_flight import read_ardupilot_flight
-from app.logs.copter_tlog import read_copter_tlog
-from app.logs.px4_flight import read_px4_flight
+from app.logs.formats import HEAD_BYTES
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
 
 pytestmark = compiled_only
 
-READERS = {"bin": read_ardupilot_flight, "tlog": read_copter_tlog, "ulg": read_px4_flight}
 SITL: Mapping[str, float] = {"hover_throttle": 0.365, "thrust_slope": 1.0, "motor_lag_s": 0.0, "drag_1_s": 0.295}
 SIH: Mapping[str, float] = {"hover_throttle": 0.490, "thrust_slope": 1.0, "motor_lag_s": 0.05}
 """The vehicles of both simulations, by a regression of the acceleration in still air, and their own source. The drag of
@@ -54,7 +52,12 @@ FLIGHTS = (
 
 @cache
 def read(name: str) -> LoggedFlight:
-    return READERS[name.rpartition(".")[2]](io.BytesIO(recorded(name)), name=name)
+    content = recorded(name)
+    reader = reader_of(content[:HEAD_BYTES])
+    assert reader is not None
+    flight = reader.flight(reader.read(io.BytesIO(content), None), name)
+    assert flight is not None
+    return flight
 
 
 @pytest.mark.complete

@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.flight import ardupilot_flight
+from app.autopilots.ardupilot.log import read_ardupilot
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError
 from app.core.records.trajectory import Samples
-from app.logs.ardupilot_flight import read_ardupilot_flight
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.logs.recorded import recorded
 from tests.logs.written import (
@@ -24,6 +25,7 @@ from tests.logs.written import (
     NEWER_PARAMETERS,
     NOT_LANDED,
     PARAMETERS,
+    PSCD,
     STABILIZE,
     VIBRATION_FAILSAFE,
     ardupilot_log,
@@ -36,7 +38,7 @@ def gusty() -> LoggedFlight:
 
 
 def read(content: bytes) -> LoggedFlight:
-    return read_ardupilot_flight(io.BytesIO(content), name="flight.bin")
+    return ardupilot_flight(read_ardupilot(io.BytesIO(content)), "flight.bin")
 
 
 def loop_of(flight: LoggedFlight) -> ArduPilotLoop:
@@ -200,10 +202,26 @@ def test_rows_that_came_twice_count_once() -> None:
     assert spans_s(flight) == [(10.0, 26.9)]
 
 
-def test_after_a_restart_of_the_clock_the_last_flight_counts() -> None:
-    """Two boots in one file, the first with 8 s more of it."""
+def test_after_a_restart_of_the_clock_the_flights_of_both_boots_count() -> None:
+    """Two boots in one file, the first with 8 s more of it, the second 20 s after its end."""
     first, second = ardupilot_log(gusty(), begin_s=18.0), ardupilot_log(gusty())
-    assert spans_s(read(first + second)) == [(10.0, 26.9)]
+    alone = spans_s(read(first)) + spans_s(read(second))
+    found = spans_s(read(first + second))
+    assert found[0] == alone[0]
+    assert [end - begin for begin, end in found] == pytest.approx([end - begin for begin, end in alone], abs=0.11)
+    assert found[1][0] > found[0][1] + 20.0
+
+
+def test_a_flight_before_a_restart_on_the_bench_counts() -> None:
+    flown, bench = ardupilot_log(gusty()), ardupilot_log(gusty(), events=())
+    assert spans_s(read(flown + bench)) == spans_s(read(flown))
+
+
+def test_a_row_with_a_damaged_time_is_left_out() -> None:
+    content = ardupilot_log(gusty())
+    damaged = bytearray(content)
+    damaged[content.index(bytes([0xA3, 0x95, PSCD]), len(content) // 2) + 8] ^= 0x10
+    assert spans_s(read(bytes(damaged))) == spans_s(read(content))
 
 
 def test_a_leaning_vehicle_carries_by_the_cosine_of_its_throttle() -> None:

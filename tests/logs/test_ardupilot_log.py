@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.core.control.ardupilot_log import LoopLog
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError
-from app.logs.ardupilot_log import read_ardupilot_log
 from tests.logs.recorded import recorded
 
 LOG = recorded("arducopter_steps.bin")
@@ -20,7 +21,7 @@ def read(*renamed: tuple[bytes, bytes]) -> LoopLog:
     for name, other in renamed:
         assert len(name) == len(other)
         content = content.replace(name, other)
-    return read_ardupilot_log(io.BytesIO(content), name="flight.bin")
+    return ardupilot_loop_log(read_ardupilot(io.BytesIO(content)), name="flight.bin")
 
 
 def test_rows_parameters_and_targets_are_those_of_the_flight() -> None:

@@ -3,10 +3,10 @@ import json
 
 import pytest
 
+from app.autopilots.ardupilot.trace import COLUMNS, is_ardupilot_trace, read_ardupilot_trace
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.control.ardupilot_replay import Hover, LoopTrace
 from app.core.errors import InputError
-from app.logs.ardupilot_trace import COLUMNS, is_ardupilot_trace, read_ardupilot_trace
 
 HOVER = {"z_m": 6.0, "v_m_s": 0.1, "a_m_s2": -0.2, "throttle": 0.39}
 DESCRIPTION = {

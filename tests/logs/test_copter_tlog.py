@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.copter_tlog import copter_steps
+from app.autopilots.tlog import read_tlog
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.errors import InputError
-from app.logs.copter_tlog import is_copter_tlog, read_copter_tlog
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS
 from tests.logs.written_tlog import CLIMB_AND_DESCENT, LOITER, PX4_RECORDING, Recording, flown, repeated_and_late
@@ -20,8 +21,9 @@ STEPS = Recording()
 
 
 def read(content: bytes) -> LoggedFlight:
-    assert is_copter_tlog(content)
-    return read_copter_tlog(io.BytesIO(content), name="flight.tlog")
+    flight = copter_steps(read_tlog(io.BytesIO(content)), "flight.tlog")
+    assert flight is not None
+    return flight
 
 
 def problems_in(content: bytes) -> dict[str, str]:
@@ -166,5 +168,4 @@ def test_a_flight_that_cannot_be_used_is_refused(log: Recording, field: str, rea
 
 
 def test_a_telemetry_log_of_paparazzi_is_not_one_of_these() -> None:
-    assert not is_copter_tlog(recorded("paparazzi_283_13_82.tlog"))
-    assert not is_copter_tlog(b"")
+    assert copter_steps(read_tlog(io.BytesIO(recorded("paparazzi_283_13_82.tlog"))), "flight.tlog") is None

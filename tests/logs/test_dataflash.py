@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pymavlink import DFReader
 
+from app.autopilots.readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
 from app.logs.dataflash import read_tables
-from app.logs.readers import read_takeoff, read_takeoffs
 from tests.logs.recorded import OnBoardLog, recorded
 
 LOG = "arducopter_takeoff.bin"
@@ -36,7 +36,7 @@ def test_every_wanted_message_is_what_pymavlink_reads(tmp_path: Path) -> None:
     path.write_bytes(recorded(LOG))
     reference = DFReader.DFReader_binary(str(path))
     names = ("PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT")
-    ours = read_tables(path.read_bytes(), frozenset(names))
+    ours = read_tables(path.read_bytes(), names).tables
     rows = dict.fromkeys(names, 0)
     while (message := reference.recv_match(type=list(names))) is not None:
         kind = message.get_type()

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from app.autopilots.paparazzi.trace import COLUMNS, read_loop_trace
 from app.core.errors import InputError
-from app.logs.loop_trace import COLUMNS, read_loop_trace
 
 HEADER = ",".join(COLUMNS)
 ROW = "0,alt,768,283,13,82,0,0,0,16384,0,0,0,0,0,7588,0,7588"
@@ -59,7 +59,7 @@ def test_malformed_files_are_refused_naming_line_and_column(tmp_path: Path, line
 
 
 def test_traces_beyond_the_limit_are_refused_while_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.logs.loop_trace.MAX_ROWS", 2)
+    monkeypatch.setattr("app.logs.trace_table.MAX_ROWS", 2)
     with pytest.raises(InputError, match=r"line 4, step: a trace may have at most 2 rows"):
         read_loop_trace(trace(tmp_path, HEADER, *[ROW] * 3))
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import pytest
 
+from app.autopilots.readers import read_takeoff, read_takeoffs
+from app.autopilots.takeoffs import Takeoff
 from app.core.errors import TrajectoryError
-from app.logs.readers import read_takeoff, read_takeoffs
-from app.logs.takeoffs import Takeoff
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded
 from tests.vehicles.flying import TAKEOFF

@@ -11,12 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.px4.flight import px4_flight
+from app.autopilots.px4.log import read_px4
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import Segment
 from app.core.control.px4_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError
-from app.logs.px4_flight import read_px4_flight
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.recorded import recorded
 from tests.logs.written_px4 import FLIGHT as IN_FLIGHT
@@ -41,7 +42,7 @@ def logged() -> Segment:
 
 
 def read(content: bytes) -> LoggedFlight:
-    return read_px4_flight(io.BytesIO(content), name="flight.ulg")
+    return px4_flight(read_px4(io.BytesIO(content)), "flight.ulg")
 
 
 def loop_of(flight: LoggedFlight) -> Px4Loop:

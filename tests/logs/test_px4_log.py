@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.replica_check import px4_loop_log
 from app.core.control.px4 import FLIGHT
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_parameters import Parameters
 from app.core.errors import InputError
-from app.logs.px4_log import read_px4_log
 from tests.logs.recorded import recorded
 
 LOG = recorded("px4_takeoff.ulg")
@@ -25,7 +26,7 @@ def read(*renamed: tuple[bytes, bytes]) -> LoopLog:
         assert len(name) == len(other)
         assert name in content
         content = content.replace(name, other)
-    return read_px4_log(io.BytesIO(content), name="flight.ulg")
+    return px4_loop_log(read_px4(io.BytesIO(content)), name="flight.ulg")
 
 
 def test_rows_and_parameters_are_those_of_the_flight() -> None:
@@ -101,5 +102,5 @@ def test_a_damaged_log_is_read_or_refused(length: int, changes: list[tuple[int, 
         if place < length:
             content[place] = value
     with suppress(InputError):
-        log = read_px4_log(io.BytesIO(bytes(content)), name="damaged.ulg")
+        log = px4_loop_log(read_px4(io.BytesIO(bytes(content))), name="damaged.ulg")
         assert all(len(values) == len(log.place) for values in replica_of(log).values())

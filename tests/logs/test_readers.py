@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.readers import SUFFIXES, read_takeoffs
+from app.autopilots.takeoffs import MIN_SAMPLES
 from app.core.errors import TrajectoryError
 from app.logs import base
-from app.logs.readers import READERS, SUFFIXES, read_takeoffs
-from app.logs.takeoffs import MIN_SAMPLES
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import OnBoardLog, recorded
 from tests.logs.test_ulog import small_log
@@ -115,10 +115,6 @@ def test_a_companion_without_its_record_is_refused_as_such() -> None:
 
 def test_the_content_decides_whatever_the_name_is() -> None:
     assert read_takeoffs(io.BytesIO(recorded("arducopter_takeoff.bin")), name="flight.csv")[0].gains
-
-
-def test_every_reader_has_a_suffix_of_its_own() -> None:
-    assert len({reader.suffix for reader in READERS}) == len(READERS) == len(SUFFIXES) - 1
 
 
 def test_a_log_beyond_half_a_gibibyte_is_refused_before_it_is_read(tmp_path: Path) -> None:

@@ -8,10 +8,10 @@ import pytest
 from pymavlink.dialects.v10 import paparazzi
 from pymavlink.dialects.v20 import ardupilotmega, common
 
+from app.autopilots.readers import read_takeoff, read_takeoffs
+from app.autopilots.takeoffs import NOT_COMMANDED
 from app.core.errors import TrajectoryError
-from app.logs.readers import read_takeoff, read_takeoffs
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.logs.takeoffs import NOT_COMMANDED
 from tests.logs.recorded import SCRIPT_CURRENT_4, TAKEOFFS, TLOGS, Telemetry, recorded
 from tests.vehicles.flying import TAKEOFF
 
@@ -160,6 +160,44 @@ def test_a_vehicle_that_restarts_goes_on_in_the_ground_s_time() -> None:
     flown = read_takeoff(io.BytesIO(log.content))
     assert flown.start_s == pytest.approx(26.0, abs=0.05)
     assert "the vehicle restarted and reset its clock (1×)" in flown.notes
+
+
+def test_a_vehicle_that_restarts_right_after_it_booted_is_noticed() -> None:
+    log = paparazzi_log()
+    log.booted_s = log.now_s - 1.0
+    log.fly(5.0, to_m=0.0)
+    log.now_s += 3.0
+    log.booted_s = log.now_s - 2.0
+    log.fly(2.0, to_m=0.0)
+    log.ground("script_item", 31, 0, 1, b"")
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.start_s == pytest.approx(10.0, abs=0.05)
+    assert "the vehicle restarted and reset its clock (1×)" in flown.notes
+
+
+def test_late_messages_are_no_restart() -> None:
+    log = paparazzi_log()
+    log.fly(5.0, to_m=0.0)
+    log.booted_s += 3.0
+    log.fly(0.1, to_m=0.0)
+    log.booted_s -= 3.0
+    log.fly(2.0, to_m=0.0)
+    log.ground("script_item", 31, 0, 1, b"")
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.start_s == pytest.approx(7.1, abs=0.05)
+    assert not any("restarted" in note for note in flown.notes)
+
+
+def test_of_two_vehicles_the_one_that_reports_its_position_more_often_is_read() -> None:
+    idle, log = Telemetry(ardupilotmega, autopilot=3, system=2), Telemetry(ardupilotmega, autopilot=3, system=1)
+    idle.heartbeat()
+    idle.fly(1.0, to_m=0.0)
+    log.heartbeat()
+    log.fly(1.0, to_m=0.0)
+    log.fly(5.0, to_m=3.0)
+    assert read_takeoff(io.BytesIO(idle.content + log.content)).trajectory["altitude_m"].max() > 2.9
 
 
 @pytest.mark.parametrize(

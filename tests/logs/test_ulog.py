@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from app.autopilots.px4.log import read_px4
+from app.autopilots.readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
-from app.logs.readers import read_takeoff, read_takeoffs
-from app.logs.ulog import read_ulog
 from tests.logs.recorded import ULOG_HEADER as HEADER
 from tests.logs.recorded import recorded
 from tests.logs.recorded import ulog_message as message
@@ -33,9 +33,9 @@ def test_the_recorded_takeoff_is_found_with_its_gains() -> None:
 
 def test_the_sieved_log_holds_the_same_altitude_as_the_whole_one() -> None:
     whole = ULog(io.BytesIO(recorded(LOG)), message_name_filter_list=["vehicle_local_position"]).data_list[0].data
-    ours = read_ulog(io.BytesIO(recorded(LOG)))
+    ours = read_px4(io.BytesIO(recorded(LOG))).columns["altitude_m"]
     np.testing.assert_array_equal(ours.time_s, whole["timestamp"] / 1e6)
-    np.testing.assert_array_equal(ours.channels["altitude_m"], -whole["z"].astype(np.float64))
+    np.testing.assert_array_equal(ours.values, -whole["z"].astype(np.float64))
 
 
 def small_log(*, after: bytes = b"") -> bytes:

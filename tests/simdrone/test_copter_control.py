@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from app.autopilots.ardupilot.simulated_control import ArduPilotController
+from app.autopilots.px4.simulated_control import Px4Controller
+from app.autopilots.simulated.copter import Copter
 from app.core.control import ardupilot, px4
-from app.simdrone.ardupilot_control import ArduPilotController
-from app.simdrone.copter import Copter
-from app.simdrone.px4_control import Px4Controller
 from tests.simdrone.copters import (
     ARM,
     ARMED,

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, throttle_command
 from app.core.control.paparazzi import RATE_HZ
 from app.core.errors import InputError
-from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, new_body, throttle_command
+from app.simdrone.body import new_body
 from app.simdrone.drone import LARGEST_LAG_S
 from app.simdrone.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.mavlink.transports import LinkError

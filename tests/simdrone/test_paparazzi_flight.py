@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.simulated.body import VerticalCommand
 from app.core.control.paparazzi import ALT
-from app.simdrone.body import vertical_command
+from app.simdrone.body import packed
 from app.vehicles.registry import check_options
 from app.vehicles.twin import TwinFlight
 from tests.simdrone.ground import STILL, Ground, Heard, flying
@@ -59,7 +60,7 @@ def test_its_takeoff_is_the_replicas_to_the_last_digit(pilot: Pilot) -> None:
     pilot.take_off()
     heard = heights_m(pilot.ground.listen(15.0))
     flight = TwinFlight({name: float(value) for name, value in check_options("twin", STILL).items()}, seed=1)
-    rows = flight.advance(15 * 512, vertical_command(ALT, 3 * 256 - 25, *TUNED))
+    rows = flight.advance(15 * 512, packed(VerticalCommand(ALT, 3 * 256 - 25, *TUNED)))
     model = np.round(rows[:, 0] * 256) / 256 + GROUND_M
     lifted = int(np.argmax(heard > GROUND_M + 0.05))
     first = int(np.argmax(model > GROUND_M + 0.05))

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.px4 import simulated_hover as px4_hover
+from app.autopilots.px4.simulated_control import LOOP_S
+from app.autopilots.px4.simulated_hover import HoverSettings
+from app.autopilots.px4.simulated_trajectory import Limits, Trajectory
 from app.core.records.trajectory import Samples
-from app.simdrone import px4_hover
-from app.simdrone.px4_control import LOOP_S
-from app.simdrone.px4_hover import HoverSettings
-from app.simdrone.px4_trajectory import Limits, Trajectory
 
 FLIGHT = Path(__file__).parents[1] / "data" / "px4_loop" / "default_steps_push.csv.gz"
 SETTINGS = HoverSettings(hover_thrust=0.5, initial_error=0.1, noise_1_s=0.0036, gate=3.0, range=0.2, fast_m_s=2.0)

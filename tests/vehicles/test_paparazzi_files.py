@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from app.simdrone import paparazzi_plan as simulated
+from app.autopilots.paparazzi import simulated_plan as simulated
+from app.autopilots.paparazzi.profile import BLOCKS, LAND, PAPARAZZI, TAKE_OFF
 from app.vehicles.mavlink.preflight import POSITIONS_HZ
-from app.vehicles.mavlink.profiles.paparazzi import BLOCKS, LAND, TAKE_OFF, Paparazzi
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.simulated import FLIGHT_S
 
@@ -43,7 +43,7 @@ def test_the_plan_has_every_block_that_a_trial_asks_for_or_passes_through(flight
     assert set(BLOCKS) <= set(names)
     after = names[names.index(LAND) :]
     assert after[-1] == "landed"
-    assert Paparazzi.landing_blocks >= set(after)
+    assert PAPARAZZI.landing_blocks >= set(after)
     for each in flight_plan.iter("exception"):
         assert each.attrib["deroute"] in names
 
@@ -93,7 +93,7 @@ def test_from_landing_on_the_plan_never_climbs_and_ends_without_thrust(flight_pl
     for name, following in pairwise(names[names.index(LAND) :]):
         parts = block(flight_plan, name)
         assert [float(each.attrib["climb"]) for each in parts.iterfind("stay")] in ([], [-simulated.DESCENT_M_S])
-        assert following in Paparazzi.landing_blocks
+        assert following in PAPARAZZI.landing_blocks
     [idle] = block(flight_plan, "landed")
     assert (idle.attrib["throttle"], idle.attrib["vmode"], idle.attrib["until"]) == ("0", "throttle", "FALSE")
 
@@ -114,6 +114,6 @@ def test_the_airframe_defines_where_the_drone_sends_to() -> None:
 def test_telemetry_comes_as_often_as_a_trial_needs_it(periods_s: dict[str, float]) -> None:
     assert periods_s["LOCAL_POSITION_NED"] == 0.02
     assert 1.0 / periods_s["LOCAL_POSITION_NED"] > POSITIONS_HZ
-    assert periods_s["HEARTBEAT"] <= Paparazzi.heartbeat_s
+    assert periods_s["HEARTBEAT"] <= PAPARAZZI.heartbeat_s
     assert periods_s["SYS_STATUS"] <= 1.0
     assert "AUTOPILOT_VERSION" in periods_s

@@ -7,12 +7,13 @@ trial.
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
 import numpy as np
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
+from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
@@ -46,7 +47,6 @@ from app.db.models import CampaignRow, TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
-from app.logs.takeoffs import NOT_COMMANDED, Takeoff
 from app.processes.sandbox import FILE, run_limited
 from app.vehicles.flight_end import FlightEnd, Requester
 
@@ -219,21 +219,9 @@ def _classify(row: TrialRow, refusal: str) -> None:
         set_trial_state(row, TrialState.VALID)
 
 
-def read_record(
-    stream: BinaryIO, *, name: str = "", takeoff: int | None = None, companion: BinaryIO | None = None
-) -> Takeoff:
-    """Read a takeoff from a log of any format.
-
-    Raises TrajectoryError; where the log holds several takeoffs, it names them.
-    """
-    from app.logs.readers import read_takeoff  # noqa: PLC0415 - imports every reader
-
-    return read_takeoff(stream, name=name, number=takeoff, companion=companion)
-
-
 def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
     """Read a takeoff from an uploaded file, in a process with limits. Raises InputError when it exceeds them."""
-    from app.logs.readers import read_content  # noqa: PLC0415 - imports every reader
+    from app.autopilots.readers import read_content  # noqa: PLC0415 - imports every reader
 
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 

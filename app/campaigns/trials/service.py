@@ -11,6 +11,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
+from app.autopilots.experiments import experiment_of
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
@@ -25,9 +26,8 @@ from app.common.schemas import Gate, Page, decode_cursor, encode_cursor
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.errors import TrajectoryError
-from app.core.experiments import experiment_of
 from app.core.policy import Gains
-from app.core.tuning.gate import GateResult, check_policy, require_flyable, space_of
+from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategy import Proposal
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
@@ -82,7 +82,8 @@ def evaluate_gate(session: Session, campaign_id: int, asked: Gains) -> Gate:
 def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
     """The gains, complete and in order, and the gate's result."""
     definition = definition_of(campaign)
-    experiment, space = experiment_of(definition), space_of(definition)
+    experiment = experiment_of(definition)
+    space = experiment.space.narrowed(definition.bounds)
     gains = space.complete(asked)
     flown = history.flights_of(session, campaign.id, recorded=())
     searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)

@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from sqlalchemy.orm import Session
 
+from app.autopilots.experiments import get_experiment
 from app.campaigns import history, repository
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
@@ -18,7 +19,6 @@ from app.common.conflict_checks import allowed
 from app.common.schemas import Interval
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter
 from app.core.formatting import named_flights, percent, short
 from app.core.policy import Gains

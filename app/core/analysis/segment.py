@@ -1,7 +1,7 @@
 """An uninterrupted part of a logged flight, and its signals at every step of the loop."""
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, fields, replace
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ class Segment:
     throttle: Samples
     throttle_filtered: Samples
     assumed_hover: Samples
+
+    def part(self, rows: NDArray[np.int64]) -> Self:
+        """These rows."""
+        return replace(self, **{each.name: getattr(self, each.name)[rows] for each in fields(self)})
 
     @property
     def duration_s(self) -> float:

@@ -44,7 +44,7 @@ class AltitudeSteps(VerticalLoop):
     """
 
     name = "altitude-steps"
-    title = "Altitude steps"
+    title = curves_title = "Altitude steps"
     options = step_options(largest_step_m=1.0)
     scored_from_s = CLIMB_S
     target_channel = REFERENCE

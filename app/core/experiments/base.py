@@ -232,6 +232,8 @@ class Experiment(ABC):
 
     name: str
     title: str
+    curves_title: str = "Takeoff curves"
+    """Title of the figure with all its flights."""
     options: tuple[Option, ...]
     """Settings of the experiment itself, for example of its model."""
     space: PolicySpace

@@ -88,6 +88,7 @@ class CopterSteps(ModelledExperiment):
     options = step_options(largest_step_m=LARGEST_STEP_M)
     output = ALTITUDE
     error_unit = "m"
+    curves_title = "Altitude steps"
     scored_from_s = CLIMB_S
     target_channel = REFERENCE
     set_points: SetPoints

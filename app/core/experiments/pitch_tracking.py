@@ -92,6 +92,7 @@ class PitchTracking(ModelledExperiment):
 
     name = "pitch-tracking"
     title = "Pitch tracking of an F-16"
+    curves_title = "Pitch error curves"
     output = OUTPUT
     integrates = True
     error_unit = "rad·s"

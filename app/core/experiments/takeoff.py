@@ -1,8 +1,5 @@
 """The paper's takeoff: from the ground to 3 m, scored by the altitude error; under Paparazzi's vertical loop, or under
-ArduCopter or PX4 with gains of their own controllers, without a model so far.
-
-The ranges of the latter are those that may be written to such a vehicle at all: a campaign narrows them to suit its
-vehicle.
+another autopilot with gains of its own controllers, without a model so far.
 """
 
 from collections.abc import Mapping
@@ -133,26 +130,9 @@ class Takeoff(VerticalLoop):
 _PAPER: Final = Takeoff()
 
 
-def _copter_gain(name: str, title: str, unit: str, lower: float, upper: float, default: float) -> Gain:
+def copter_gain(name: str, title: str, unit: str, lower: float, upper: float, default: float) -> Gain:
+    """A gain of another autopilot."""
     return Gain(name, title, unit, lower=lower, upper=upper, scale=upper / 10, default=default, integer=False)
-
-
-ARDUPILOT_GAINS: Final = (
-    _copter_gain("PSC_POSZ_P", "Climb rate per altitude error", "1/s", 0.1, 4.0, 1.0),
-    _copter_gain("PSC_VELZ_P", "Acceleration per climb rate error", "1/s", 0.5, 10.0, 5.0),
-    _copter_gain("PSC_ACCZ_P", "Thrust per acceleration error", "10 %·s²/m", 0.05, 2.0, 0.5),
-    _copter_gain("PSC_ACCZ_I", "Thrust per integrated acceleration error", "10 %·s/m", 0.2, 4.0, 1.0),
-    _copter_gain("PSC_ACCZ_D", "Thrust per change of acceleration error", "10 %·s³/m", 0.0, 0.4, 0.0),
-)
-"""Names and defaults before release 4.7; from 4.7 on the names differ, and the acceleration gains are a tenth. Without
-an integral gain of the acceleration the firmware does not arm, and a wrong hover throttle is never corrected."""
-
-PX4_GAINS: Final = (
-    _copter_gain("MPC_Z_P", "Climb rate per altitude error", "1/s", 0.1, 1.5, 1.0),
-    _copter_gain("MPC_Z_VEL_P_ACC", "Acceleration per climb rate error", "1/s", 2.0, 15.0, 4.0),
-    _copter_gain("MPC_Z_VEL_I_ACC", "Acceleration per integrated climb rate error", "1/s²", 0.2, 3.0, 2.0),
-    _copter_gain("MPC_Z_VEL_D_ACC", "Acceleration per measured acceleration", "", 0.0, 2.0, 0.0),
-)
 
 
 class CopterTakeoff(Experiment):
@@ -195,7 +175,3 @@ class CopterTakeoff(Experiment):
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
         return self._paper.error(trajectory, accept_gaps=accept_gaps)
-
-
-TAKEOFF_ARDUPILOT: Final = CopterTakeoff("takeoff-ardupilot", "ArduCopter", ARDUPILOT_GAINS)
-TAKEOFF_PX4: Final = CopterTakeoff("takeoff-px4", "PX4", PX4_GAINS)

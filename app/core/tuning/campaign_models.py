@@ -6,25 +6,30 @@ from typing import Final
 
 from app.core.definition import Flight
 from app.core.errors import InputError, TrajectoryError
+from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import Experiment, ModelledExperiment, ParameterDistribution, prior_distribution
+from app.core.experiments.copter_steps import CopterSteps
+from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.campaign_model import CampaignModel
 from app.core.tuning.copter_model import fit_copter_steps
 from app.core.tuning.vertical_model import fit_steps, fit_takeoff
 
-MODELS: Final[Mapping[str, Callable[[ModelledExperiment, Sequence[Flight]], CampaignModel]]] = MappingProxyType(
-    {
-        "takeoff": fit_takeoff,
-        "altitude-steps": fit_steps,
-        "altitude-steps-ardupilot": fit_copter_steps,
-        "altitude-steps-px4": fit_copter_steps,
-    }
+Fit = Callable[[ModelledExperiment, Sequence[Flight]], CampaignModel]
+
+FITS: Final[Mapping[type[object], Fit]] = MappingProxyType(
+    {Takeoff: fit_takeoff, AltitudeSteps: fit_steps, CopterSteps: fit_copter_steps}
 )
-"""By the name of the experiment; at least one flight must be valid."""
+"""By the kind of experiment; at least one flight must be valid."""
+
+
+def fit_of(experiment: Experiment) -> Fit | None:
+    """The fit of the experiment's model; None if there is none."""
+    return next((fit for kind, fit in FITS.items() if isinstance(experiment, kind)), None)
 
 
 def is_calibrated(experiment: ModelledExperiment) -> bool:
     """Whether the parameters of its model are found by `app.core.tuning.calibration`."""
-    return MODELS.get(experiment.name) in (fit_takeoff, fit_steps)
+    return fit_of(experiment) in (fit_takeoff, fit_steps)
 
 
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
@@ -34,10 +39,11 @@ def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> Par
     distribution is empty.
     """
     modelled = experiment.modelled
-    if modelled is None or modelled.name not in MODELS or all(flight.error is None for flight in flights):
+    fit = None if modelled is None else fit_of(modelled)
+    if modelled is None or fit is None or all(flight.error is None for flight in flights):
         return prior_distribution(experiment)
     try:
-        return MODELS[modelled.name](modelled, flights).spread
+        return fit(modelled, flights).spread
     except (InputError, TrajectoryError):
         return prior_distribution(experiment)
 

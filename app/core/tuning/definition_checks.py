@@ -6,7 +6,7 @@ from typing import Final
 
 from app.core.definition import Definition, LogEvidence, StopRule, problems_of_options
 from app.core.errors import InputError, Problem
-from app.core.experiments import EXPERIMENTS
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.experiments.copter_steps import CopterSteps
 from app.core.policy import PolicySpace
 from app.core.tuning.strategies import STRATEGIES
@@ -25,9 +25,9 @@ _LARGEST_DEVIATION: Final = 100.0
 """Far beyond the range of every parameter of a vehicle's model; the square of any such number is finite."""
 
 
-def check_definition(definition: Definition) -> None:
+def check_definition(definition: Definition, experiments: Mapping[str, Experiment]) -> None:
     """Raise InputError naming every field that cannot be used."""
-    if problems := problems_of(definition):
+    if problems := problems_of(definition, experiments):
         raise InputError(
             "Invalid campaign definition.",
             problems=problems,
@@ -35,50 +35,51 @@ def check_definition(definition: Definition) -> None:
         )
 
 
-def problems_of(definition: Definition) -> tuple[Problem, ...]:
-    """All problems of the definition, each with its field (`stop.max_flights`, `bounds.kp`, …)."""
+def problems_of(definition: Definition, experiments: Mapping[str, Experiment]) -> tuple[Problem, ...]:
+    """All problems of a definition with one of these experiments, each with its field (`stop.max_flights`, …)."""
+    experiment = experiments.get(definition.experiment)
     return (
-        *_names(definition),
-        *_options(definition),
-        *_steps(definition),
-        *_fit(definition),
-        *_policy(definition),
+        *_names(definition, experiments),
+        *_options(definition, experiment),
+        *_steps(definition, experiment),
+        *_fit(definition, experiments),
+        *_policy(definition, experiment),
         *_fractions(definition),
-        *_ceiling(definition),
+        *_ceiling(definition, experiment),
         *_stop(definition.stop),
         *_seed(definition.seed),
     )
 
 
-def _names(definition: Definition) -> Iterator[Problem]:
-    if definition.experiment not in EXPERIMENTS:
-        yield Problem("experiment", f"must be one of {', '.join(EXPERIMENTS)}, got {definition.experiment!r}")
+def _names(definition: Definition, experiments: Mapping[str, Experiment]) -> Iterator[Problem]:
+    if definition.experiment not in experiments:
+        yield Problem("experiment", f"must be one of {', '.join(experiments)}, got {definition.experiment!r}")
     if definition.strategy not in STRATEGIES:
         yield Problem("strategy", f"must be one of {', '.join(STRATEGIES)}, got {definition.strategy!r}")
 
 
-def _options(definition: Definition) -> Iterator[Problem]:
+def _options(definition: Definition, experiment: Experiment | None) -> Iterator[Problem]:
     if definition.strategy in STRATEGIES:
         strategy = STRATEGIES[definition.strategy]
         yield from problems_of_options(definition.options, strategy.options, field="options", owner=strategy.name)
-    if definition.experiment in EXPERIMENTS:
-        experiment = EXPERIMENTS[definition.experiment]
+    if experiment is not None:
         yield from problems_of_options(
             definition.experiment_options, experiment.options, field="experiment_options", owner=experiment.name
         )
 
 
-def _fit(definition: Definition) -> Iterator[Problem]:
-    if definition.strategy not in STRATEGIES or definition.experiment not in EXPERIMENTS:
+def _fit(definition: Definition, experiments: Mapping[str, Experiment]) -> Iterator[Problem]:
+    if definition.strategy not in STRATEGIES or definition.experiment not in experiments:
         return
-    strategy, experiment = STRATEGIES[definition.strategy], EXPERIMENTS[definition.experiment]
+    strategy, experiment = STRATEGIES[definition.strategy], experiments[definition.experiment]
     if experiment.modelled is None:
         yield from _without_model(definition)
         return
-    if strategy.experiments and definition.experiment not in strategy.experiments:
-        yield Problem("strategy", f"{strategy.name!r} works only with {', '.join(strategy.experiments)}")
-    if definition.start.kind == "simplex" and not SIMPLEX.works_with(experiment):
-        yield Problem("start.kind", f"'simplex' works only with {', '.join(SIMPLEX.experiments)}")
+    wanted = {"strategy": strategy} | ({"start.kind": SIMPLEX} if definition.start.kind == "simplex" else {})
+    for field, chosen in wanted.items():
+        if not chosen.works_with(experiment):
+            fitting = ", ".join(name for name, each in experiments.items() if chosen.works_with(each))
+            yield Problem(field, f"{chosen.name!r} works only with {fitting}")
 
 
 def _without_model(definition: Definition) -> Iterator[Problem]:
@@ -90,21 +91,21 @@ def _without_model(definition: Definition) -> Iterator[Problem]:
         yield Problem("start.kind", f"'simplex' needs a model, and {lacks}: choose 'default' or 'given'")
 
 
-def _policy(definition: Definition) -> Iterator[Problem]:
-    if definition.experiment not in EXPERIMENTS:
+def _policy(definition: Definition, experiment: Experiment | None) -> Iterator[Problem]:
+    if experiment is None:
         return
-    space = EXPERIMENTS[definition.experiment].space
+    space = experiment.space
     try:
         space = space.narrowed(definition.bounds)
     except InputError as error:
         yield from error.problems
     try:
-        _check_start(definition, space)
+        _check_start(definition, experiment, space)
     except InputError as error:
         yield from error.problems
 
 
-def _check_start(definition: Definition, space: PolicySpace) -> None:
+def _check_start(definition: Definition, experiment: Experiment, space: PolicySpace) -> None:
     start = definition.start
     brings_gains = start.kind in {"given", "campaign"}
     if brings_gains != (start.gains is not None):
@@ -115,7 +116,7 @@ def _check_start(definition: Definition, space: PolicySpace) -> None:
         reason = "is required with start.kind 'campaign', and not allowed with any other"
         raise _invalid_start(Problem("start.donor", reason))
     if start.log is not None:
-        _check_log(definition, start.log)
+        _check_log(definition, experiment.modelled, start.log)
     if start.kind == "given" and start.gains is not None:
         space.check(start.gains, field="start.gains")
     elif start.kind != "simplex":
@@ -123,8 +124,7 @@ def _check_start(definition: Definition, space: PolicySpace) -> None:
         _check_bounds_hold(space, space.complete(given, field="start.gains"))
 
 
-def _check_log(definition: Definition, log: LogEvidence) -> None:
-    modelled = EXPERIMENTS[definition.experiment].modelled
+def _check_log(definition: Definition, modelled: ModelledExperiment | None, log: LogEvidence) -> None:
     if definition.start.kind != "given" or not isinstance(modelled, CopterSteps):
         reason = "is allowed only with start.kind 'given', for altitude steps under ArduCopter or PX4"
         raise _invalid_start(Problem("start.log", reason))
@@ -177,31 +177,31 @@ def _fractions(definition: Definition) -> Iterator[Problem]:
             yield Problem(name, f"must be above 0 and at most 1, got {value:g}")
 
 
-def _ceiling(definition: Definition) -> Iterator[Problem]:
-    lowest_m = max(MIN_CEILING_M, highest_set_point_m(definition) + CEILING_MARGIN_M)
+def _ceiling(definition: Definition, experiment: Experiment | None) -> Iterator[Problem]:
+    lowest_m = max(MIN_CEILING_M, highest_set_point_m(definition, experiment) + CEILING_MARGIN_M)
     if not (math.isfinite(definition.ceiling_m) and lowest_m <= definition.ceiling_m <= MAX_CEILING_M):
         yield Problem(
             "ceiling_m", f"must be between {lowest_m:g} and {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}"
         )
 
 
-def highest_set_point_m(definition: Definition) -> float:
+def highest_set_point_m(definition: Definition, experiment: Experiment | None) -> float:
     """Zero where the experiment is unknown, has options that are refused, or has no altitude."""
-    return max(_altitudes_m(definition), default=0.0)
+    return max(_altitudes_m(definition, experiment), default=0.0)
 
 
-def _altitudes_m(definition: Definition) -> tuple[float, ...]:
+def _altitudes_m(definition: Definition, experiment: Experiment | None) -> tuple[float, ...]:
     """The set points; none where the experiment is unknown, has options that are refused, or has no altitude."""
-    experiment, chosen = EXPERIMENTS.get(definition.experiment), definition.experiment_options
+    chosen = definition.experiment_options
     if experiment is None or any(problems_of_options(chosen, experiment.options, field="", owner=experiment.name)):
         return ()
     set_points = experiment.configured(chosen).set_points
     return () if set_points is None else set_points.altitudes_m
 
 
-def _steps(definition: Definition) -> Iterator[Problem]:
+def _steps(definition: Definition, experiment: Experiment | None) -> Iterator[Problem]:
     """A set point below half of the highest one looks like an aborted flight in a record."""
-    altitudes_m = _altitudes_m(definition)
+    altitudes_m = _altitudes_m(definition, experiment)
     if altitudes_m and min(altitudes_m) <= 0.5 * max(altitudes_m):
         yield Problem(
             "experiment_options.step_m",

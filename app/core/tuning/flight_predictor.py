@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from functools import partial
 
 from app.core.definition import Definition, Flight, best_flight
-from app.core.experiments import experiment_of
-from app.core.experiments.base import ModelledExperiment
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
 from app.core.tuning.calibration import fitted_flights
-from app.core.tuning.campaign_models import MODELS, as_flown
+from app.core.tuning.campaign_models import as_flown, fit_of
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
-from app.core.tuning.gate import space_of
 from app.core.tuning.predictions import predict_corrected, repeat_proposal, with_interval
 from app.core.tuning.proposals import has_flown
 from app.core.tuning.strategies import STRATEGIES
@@ -52,26 +50,26 @@ class FlightPredictor:
 
 
 def flight_predictor(
-    definition: Definition, flights: Sequence[Flight], donor: Flight | None = None
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight | None = None
 ) -> FlightPredictor | None:
     """The predictor after these flights, with the model that `next_proposal` uses for them; None without a model.
 
     A fit takes up to half a second; a prediction some milliseconds, or a tenth of a second under ArduCopter.
     """
-    experiment, space = experiment_of(definition).modelled, space_of(definition)
-    if experiment is None:
+    modelled = experiment.modelled
+    if modelled is None:
         return None
     if donor is not None:
-        experiment = transfer(definition, experiment, flights, donor).experiment
-    experiment = as_flown(experiment, flights, donor)
+        modelled = transfer(definition, modelled, flights, donor).experiment
+    modelled = as_flown(modelled, flights, donor)
     strategy, flown = STRATEGIES[definition.strategy], has_flown(flights)
     model = strategy.predict_flight if flown else partial(_first_flight, donor)
     return FlightPredictor(
-        experiment=experiment,
-        space=space,
+        experiment=modelled,
+        space=experiment.space.narrowed(definition.bounds),
         flights=flights,
-        scatter=pool_scatter(groups_of(flights), experiment.scatter),
-        model=model(definition, experiment, flights),
+        scatter=pool_scatter(groups_of(flights), modelled.scatter),
+        model=model(definition, modelled, flights),
         base=best_flight(flights) if flown and strategy.corrects_model else None,
     )
 
@@ -84,19 +82,18 @@ def _first_flight(
     return partial(predict_corrected, model)
 
 
-def modelled_flights(definition: Definition, flights: Sequence[Flight]) -> frozenset[int]:
+def modelled_flights(experiment: Experiment, flights: Sequence[Flight]) -> frozenset[int]:
     """Numbers of the flights whose records `flight_predictor` needs."""
     valid = [flight for flight in flights if flight.outcome == "valid"]
-    used = fitted_flights(flights) if valid and definition.experiment in MODELS else valid
+    used = fitted_flights(flights) if valid and fit_of(experiment) is not None else valid
     return frozenset(flight.number for flight in (*valid[:1], *used))
 
 
-def predict_repeat(definition: Definition, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
+def predict_repeat(experiment: Experiment, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
     """Predict another flight of gains that were flown: the mean of their flights; None if no valid flight had them.
 
     Only the flights with these gains need their records.
     """
-    experiment = experiment_of(definition)
     groups = groups_of(flights)
     group = next((each for each in groups if each.gains == gains), None)
     if group is None:

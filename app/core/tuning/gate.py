@@ -9,7 +9,6 @@ from typing import Final
 
 from app.core.definition import Definition, Flight, was_flown
 from app.core.errors import GainsError, Problem
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Check, Envelope, Experiment, ModelledExperiment, ParameterDistribution
 from app.core.formatting import percent
 from app.core.policy import Gain, Gains, PolicySpace, Vector
@@ -195,11 +194,6 @@ def _step(
     origin = start_gains(definition, experiment, space) if start is None else start
     fraction = definition.first_step_fraction
     return check_step(space, gains, [origin], fraction, "the start gains before the first valid flight")
-
-
-def space_of(definition: Definition) -> PolicySpace:
-    """The policy space of a campaign, within its bounds."""
-    return experiment_of(definition).space.narrowed(definition.bounds)
 
 
 def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = False) -> str:

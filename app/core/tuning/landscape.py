@@ -19,12 +19,10 @@ from typing import Final
 import numpy as np
 
 from app.core.definition import Definition, Flight
-from app.core.experiments import experiment_of
-from app.core.experiments.base import Matrix
+from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.tuning.campaign_models import as_flown
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
-from app.core.tuning.gate import space_of
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import ErrorsOf
 from app.core.tuning.transfer import transfer
@@ -121,12 +119,13 @@ class LandscapeGrid:
         )
 
 
-def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
+def plan_grid(plan: LandscapePlan, experiment: Experiment) -> LandscapeGrid | None:
     """Return the model and the grid; None without a model, or with fewer than two free gains.
 
     Pure; a calibration takes up to a second.
     """
-    predict_errors, space = _error_model(plan.definition, plan.flights, plan.donor), space_of(plan.definition)
+    space = experiment.space.narrowed(plan.definition.bounds)
+    predict_errors = _error_model(plan.definition, experiment.modelled, plan.flights, plan.donor)
     if predict_errors is None or free_gains(space) < 2:
         return None
     centre = space.nearest(space.vector(plan.centre))
@@ -150,9 +149,10 @@ def free_gains(space: PolicySpace) -> int:
     return sum(gain.span > 0.0 for gain in space.gains)
 
 
-def _error_model(definition: Definition, flights: Sequence[Flight], donor: Flight | None) -> ErrorsOf | None:
+def _error_model(
+    definition: Definition, experiment: ModelledExperiment | None, flights: Sequence[Flight], donor: Flight | None
+) -> ErrorsOf | None:
     """The model that `next_proposal` uses for the same history; None if there is none."""
-    experiment = experiment_of(definition).modelled
     if experiment is None:
         return None
     if donor is not None:

@@ -126,7 +126,7 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
     default = experiment.space.mapping(experiment.space.default)
     flown = [assess("As flown", gains) for gains in flown_sets]
     stock = [] if default in flown_sets else [assess("Paparazzi's default gains", default)]
-    proposed = assess("Proposed", next_proposal(definition, flights).gains)
+    proposed = assess("Proposed", next_proposal(definition, experiment, flights).gains)
     is_better = not proposed.refusal and (
         bool(flown[0].refusal) or proposed.predicted_error_m <= _BETTER * flown[0].predicted_error_m
     )

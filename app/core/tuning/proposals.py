@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from app.core.definition import Definition, Flight, LogEvidence, aborted_by_gains
-from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, short
 from app.core.policy import Gains, PolicySpace
@@ -38,10 +37,13 @@ _ORIGIN = {
 }
 
 
-def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flight | None = None) -> Proposal:
+def next_proposal(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight | None = None
+) -> Proposal:
     """Compute the next proposal. The same definition and flights give the same proposal, bit for bit on one machine.
 
-    `definition` must be free of problems (`app.core.tuning.definition_checks`). `flights` are the valid and aborted
+    `definition` must be free of problems (`app.core.tuning.definition_checks`), and `experiment` the one it names, as
+    configured there. `flights` are the valid and aborted
     ones, in order; their trajectories are used as stored, in single precision. Without a valid flight the start gains
     are proposed. `donor` is the flight named by `definition.start.donor`: required with start kind `campaign`, and not
     allowed with others.
@@ -50,24 +52,22 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     stop rule `noise` the proposal may repeat the winner or the first gains, or be of kind `none` once no further step
     can be distinguished from noise.
     """
-    chosen = experiment_of(definition)
-    space = chosen.space.narrowed(definition.bounds)
-    experiment = chosen.modelled
-    if experiment is None:
-        return _manual_proposal(definition, chosen, space, flights)
-    warm = None if donor is None else transfer(definition, experiment, flights, donor)
+    space, modelled = experiment.space.narrowed(definition.bounds), experiment.modelled
+    if modelled is None:
+        return _manual_proposal(definition, experiment, space, flights)
+    warm = None if donor is None else transfer(definition, modelled, flights, donor)
     if warm is not None:
-        experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
-    experiment = as_flown(experiment, flights, donor)
+        modelled, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
+    modelled = as_flown(modelled, flights, donor)
     if not has_flown(flights):
-        return _start(definition, experiment, space, flights, donor)
-    scatter = pool_scatter(groups_of(flights), experiment.scatter)
+        return _start(definition, modelled, space, flights, donor)
+    scatter = pool_scatter(groups_of(flights), modelled.scatter)
     strategy = STRATEGIES[definition.strategy]
-    proposal = strategy.propose(definition, experiment, space, flights)
+    proposal = strategy.propose(definition, modelled, space, flights)
     number = proposal.explanation.base_flight if strategy.corrects_model else None
     base = next((flight for flight in flights if flight.number == number), None)
-    proposal = with_interval(experiment, space, flights, proposal, scatter, base=base)
-    return _with_notes(_confirmed(definition, experiment, space, flights, proposal), experiment, flights, warm)
+    proposal = with_interval(modelled, space, flights, proposal, scatter, base=base)
+    return _with_notes(_confirmed(definition, modelled, space, flights, proposal), modelled, flights, warm)
 
 
 def has_flown(flights: Sequence[Flight]) -> bool:

@@ -100,8 +100,9 @@ class Strategy:
     `propose(definition, experiment, space, flights)` requires at least one valid flight. `predict_errors(definition,
     experiment, flights)` returns the model from which the predicted errors of its proposals come, for many gain sets;
     `predict_flight(definition, experiment, flights)` the same model for one set, with the curve.
-    `experiments` names those it supports; empty for all. `corrects_model`: whether its predictions are corrected by the
-    flight that its explanation names as the base. `needs_model`: whether it searches for gains on a model.
+    `kinds` are those of the experiments it supports; empty for all. `corrects_model`: whether its predictions are
+    corrected by the flight that its explanation names as the base. `needs_model`: whether it searches for gains on a
+    model.
     """
 
     name: str
@@ -111,14 +112,14 @@ class Strategy:
     propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
     predict_errors: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
     predict_flight: Callable[[Definition, ModelledExperiment, Sequence[Flight]], PredictionOf]
-    experiments: tuple[str, ...] = ()
+    kinds: tuple[type[object], ...] = ()
     corrects_model: bool = True
     needs_model: bool = True
 
     def works_with(self, experiment: Experiment) -> bool:
         """Whether a campaign may combine this strategy with the experiment."""
-        named = not self.experiments or experiment.name in self.experiments
-        return named and not (self.needs_model and experiment.modelled is None)
+        supported = not self.kinds or isinstance(experiment, self.kinds)
+        return supported and not (self.needs_model and experiment.modelled is None)
 
 
 def band_channels(output: str) -> tuple[str, str]:

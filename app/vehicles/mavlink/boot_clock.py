@@ -6,7 +6,7 @@ Packets may be late, repeated, in any order, or corrupted: a single one by anoth
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.vehicles.mavlink.events import Position
+from app.autopilots.measurements import Position
 
 AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""

@@ -5,13 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from app.autopilots.commands import Action
 from app.core.clock import Clock
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, ground_observation, preflight, preparation
 from app.vehicles.mavlink.altitude_sources import AltitudeSource
-from app.vehicles.mavlink.events import Action
 from app.vehicles.mavlink.failures import HELP
 from app.vehicles.mavlink.ground_observation import WATCHED_S, GroundObservation
 from app.vehicles.mavlink.observed_vehicle import LISTEN_S, ObservedVehicle

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.autopilots.commands import Setting
 from app.vehicles.base import CheckItem, FlightOptions
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preflight, preparation
-from app.vehicles.mavlink.events import Setting
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference
 from app.vehicles.mavlink.ground_observation import Ground
 from app.vehicles.mavlink.opening import limits_of
@@ -36,7 +36,7 @@ def settings_of(order: FlightOptions, radio: AutopilotLink) -> tuple[Setting, ..
     """Return the parameters that the flight needs."""
     profile, target = radio.profile, radio.target
     settings = profile.take_off_settings(target)
-    return (*settings, *profile.set_point_settings(target)) if flies_steps(order) else settings
+    return (*settings, *profile.set_point_settings) if flies_steps(order) else settings
 
 
 def evaluate_time(order: FlightOptions, radio: AutopilotLink, options: Options) -> tuple[CheckItem, ...]:

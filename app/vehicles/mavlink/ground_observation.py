@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
+from app.autopilots.measurements import Heartbeat, Position
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
-from app.vehicles.mavlink.events import Heartbeat, Position
 from app.vehicles.mavlink.radio import AutopilotLink
 
 WATCHED_S: Final = 2.0

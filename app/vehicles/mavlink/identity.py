@@ -3,12 +3,12 @@
 from dataclasses import replace
 from typing import Final
 
+from app.autopilots.measurements import Heartbeat, Version
+from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import Identity, VehicleError
 from app.vehicles.end_texts import FAILURE_TEXTS
-from app.vehicles.mavlink.events import Heartbeat, Version
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.radio import AutopilotLink
 
 _HEARTBEAT_S: Final = 5.0
@@ -132,7 +132,7 @@ class VehicleIdentity:
         the plan's problem, or an empty string."""
         radio, problem = self._radio, ""
         try:
-            radio.target = replace(radio.target, blocks=radio.profile.explore(radio.request, radio.target))
+            radio.target = replace(radio.target, blocks=radio.explore())
         except VehicleError as error:
             problem = str(error)
         radio.send(*radio.profile.conclude(radio.target))
@@ -152,6 +152,6 @@ class VehicleIdentity:
 
 def _named(makes: frozenset[int]) -> str:
     """The autopilots with these MAV_AUTOPILOT."""
-    titles = {profile.autopilot: profile.title for profile in PROFILES.values()}
+    titles = {profile.autopilot: profile.title for profile in AUTOPILOTS.values()}
     names = " and ".join(titles.get(make, f"another autopilot ({make})") for make in sorted(makes))
     return names[:1].upper() + names[1:]

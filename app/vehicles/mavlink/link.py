@@ -14,9 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
-from app.core.clock import Clock
-from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.dialects import (
+from app.autopilots.dialects import (
     BAD_DATA,
     GROUND_STATION,
     NO_AUTOPILOT,
@@ -31,6 +29,8 @@ from app.vehicles.mavlink.dialects import (
     source_component,
     source_system,
 )
+from app.core.clock import Clock
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
 from app.vehicles.mavlink.other_peers import GONE_AFTER_S, OtherPeers
 from app.vehicles.mavlink.tlog import TlogWriter

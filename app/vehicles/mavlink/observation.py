@@ -8,8 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.mavlink.boot_clock import unwrapped
-from app.vehicles.mavlink.events import (
+from app.autopilots.measurements import (
     Attitude,
     Battery,
     BlockEntered,
@@ -19,8 +18,9 @@ from app.vehicles.mavlink.events import (
     LandedState,
     Measurement,
     Position,
-    SecondaryAltitudeReceived,
 )
+from app.vehicles.mavlink.boot_clock import unwrapped
+from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import GROUND_M, Finding, Limits
 from app.vehicles.mavlink.monitors.battery import BatteryMonitor
 from app.vehicles.mavlink.monitors.climb import ClimbMonitor

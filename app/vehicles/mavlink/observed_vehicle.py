@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from app.autopilots.commands import Action
 from app.core.clock import Clock
 from app.core.policy import Gains
 from app.vehicles.base import Identity, VehicleError
@@ -13,7 +14,7 @@ from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preparation
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
-from app.vehicles.mavlink.events import Action, PacketReceived
+from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
 from app.vehicles.mavlink.opening import open_radio
 from app.vehicles.mavlink.parameters import GainStore

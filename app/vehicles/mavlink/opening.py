@@ -5,14 +5,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from app.autopilots import signing
+from app.autopilots.autopilot import Autopilot
+from app.autopilots.commands import Target
+from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import addresses, signing
+from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import HELP, Limits
 from app.vehicles.mavlink.link import Link, Received
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Profile, Target
 from app.vehicles.mavlink.radio import REPLY_TIMEOUT_S, AutopilotLink
 from app.vehicles.mavlink.transports import Transport
 
@@ -43,7 +45,7 @@ def open_radio(
     it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
     used.
     """
-    profile = PROFILES[str(options["autopilot"])]
+    profile = AUTOPILOTS[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
     key_file = str(options["signing_key_file"])
     link = Link(
@@ -95,7 +97,7 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
     ).stretched(timeout_factor_of(options))
 
 
-def _described(profile: Profile) -> dict[str, str]:
+def _described(profile: Autopilot) -> dict[str, str]:
     """Return the display names of the modes in which it does not execute Land, with what to do in them."""
     return {mode: f"{profile.mode_names[mode]}: {what}; {HELP}" for mode, what in profile.modes_without_land.items()}
 

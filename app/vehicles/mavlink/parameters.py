@@ -11,14 +11,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from app.autopilots import commands
+from app.autopilots.commands import Outgoing, Setting
+from app.autopilots.gains import GainParameter, GainSet, check_gains
+from app.autopilots.measurements import Measurement, Parameter
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch
 from app.vehicles.end_texts import FAILURE_TEXTS
 from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.events import Measurement, PacketReceived, Parameter, Setting
+from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing, check_gains
 from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 
 LIST_ATTEMPTS: Final = 3
@@ -61,9 +63,7 @@ def read_gains(radio: AutopilotLink, gain_set: GainSet, requested: Gains | None 
 
 def read_parameter(radio: AutopilotLink, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     """Return the value of a parameter, None if the vehicle does not reply."""
-    return _request_parameter(
-        radio, radio.profile.read_parameter(radio.target, parameter), parameter, attempts=attempts
-    )
+    return _request_parameter(radio, commands.read_parameter(radio.target, parameter), parameter, attempts=attempts)
 
 
 def write_parameter(radio: AutopilotLink, parameter: str, value: float) -> float | None:
@@ -90,7 +90,7 @@ def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> d
     radio.listen(0.0)
     for _ in range(LIST_ATTEMPTS):
         if not received:
-            radio.send(base.list_parameters(radio.target))
+            radio.send(commands.list_parameters(radio.target))
             received = _list(radio, on_progress)
     for place in [place for place in range(_count(received)) if place not in received]:
         received |= _fetched(radio, place)
@@ -122,7 +122,7 @@ def _listed(packets: list[PacketReceived]) -> dict[int, Parameter]:
 
 def _fetched(radio: AutopilotLink, place: int) -> dict[int, Parameter]:
     answer = radio.request(
-        base.read_place(radio.target, place), lambda it: isinstance(it, Parameter) and it.place == place
+        commands.read_place(radio.target, place), lambda it: isinstance(it, Parameter) and it.place == place
     )
     return {place: answer} if isinstance(answer, Parameter) else {}
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from app.autopilots.autopilot import Requirement
+from app.autopilots.measurements import VehicleEvent
 from app.core.control.px4_parameters import HOVER_THRUSTS
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
 from app.core.models.set_points import SetPoints
@@ -20,13 +22,10 @@ from app.vehicles.base import (
     VehicleError,
 )
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
-from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.boot_clock import unwrapped
-from app.vehicles.mavlink.events import VehicleEvent
 from app.vehicles.mavlink.ground_observation import STANDS_WITHIN_M, GroundObservation, find_reception
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE, reports_armed
-from app.vehicles.mavlink.profiles.base import Requirement
 from app.vehicles.mavlink.radio import AutopilotLink
 
 POSITIONS_HZ: Final = 40.0
@@ -231,11 +230,11 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
 
 def _request_checks(radio: AutopilotLink) -> None:
     """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
-    request = radio.profile.checks_request(radio.target)
-    if request is not None:
+    checks, request = radio.profile.checks, radio.profile.checks_request(radio.target)
+    if checks is not None and request is not None:
         radio.request(
             request,
-            lambda reply: isinstance(reply, VehicleEvent) and reply.number == HEALTH_SUMMARY,
+            lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
             attempts=_CHECKS_ATTEMPTS,
         )
 

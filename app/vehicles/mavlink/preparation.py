@@ -5,11 +5,11 @@ motors. What changes it is sent only once it is certainly disarmed.
 from dataclasses import replace
 from typing import Final
 
+from app.autopilots import commands
+from app.autopilots.commands import Step
+from app.autopilots.measurements import DISARMING, CommandReply
 from app.vehicles.base import SafeGainsError, VehicleError
-from app.vehicles.mavlink.events import DISARMING, CommandReply
 from app.vehicles.mavlink.ground_observation import GroundObservation
-from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import Step
 from app.vehicles.mavlink.radio import AutopilotLink
 
 ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
@@ -27,7 +27,9 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
     if radio.target.stop_settings or not radio.profile.stop_settings or radio.link.duplicate_reason:
         return
     if watched.stands:
-        reply = radio.request(base.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
+        reply = radio.request(
+            commands.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING
+        )
         accepted = isinstance(reply, CommandReply) and reply.accepted
         radio.target = replace(radio.target, stops_by_command=accepted)
 

@@ -5,16 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from app.core.clock import Clock
-from app.core.records.trajectory import THROTTLE_HOLDS_S
-from app.vehicles.base import Condition
-from app.vehicles.mavlink.arming_checks import ArmingChecks
-from app.vehicles.mavlink.boot_clock import RestartCounter
-from app.vehicles.mavlink.dialects import Message, source_component
-from app.vehicles.mavlink.events import (
-    Action,
-    ActionDone,
-    ActionRefused,
+from app.autopilots.autopilot import ArmingChecks, Autopilot, AutopilotError, ReferenceSource
+from app.autopilots.commands import TARGET, Action, Outgoing, Step, Target
+from app.autopilots.dialects import Message, source_component
+from app.autopilots.measurements import (
     AltitudeError,
     Battery,
     BlockEntered,
@@ -22,7 +16,6 @@ from app.vehicles.mavlink.events import (
     Heartbeat,
     LandedState,
     Measurement,
-    PacketReceived,
     Parameter,
     Position,
     StatusText,
@@ -31,9 +24,13 @@ from app.vehicles.mavlink.events import (
     VehicleEvent,
     Version,
 )
+from app.core.clock import Clock
+from app.core.records.trajectory import THROTTLE_HOLDS_S
+from app.vehicles.base import Condition, VehicleError
+from app.vehicles.mavlink.boot_clock import RestartCounter
+from app.vehicles.mavlink.events import ActionDone, ActionRefused, PacketReceived
 from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HEARTBEATS_MISSED
 from app.vehicles.mavlink.link import Link, LinkHealth, Received
-from app.vehicles.mavlink.profiles.base import TARGET, Outgoing, Profile, ReferenceSource, Step, Target
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
@@ -130,7 +127,7 @@ class VehicleMemory:
         self.version = self.uid = ""
         self.may_arm = None
         self.has_ground_reference = False
-        self.arming_checks = ArmingChecks()
+        self.arming_checks = type(self.arming_checks)()
 
     def note(self, measurement: Measurement | None, now_s: float) -> None:
         self.reports_landing |= isinstance(measurement, LandedState)
@@ -183,7 +180,7 @@ class AutopilotLink:
     def __init__(
         self,
         link: Link,
-        profile: Profile,
+        profile: Autopilot,
         clock: Clock,
         target: Target,
         *,
@@ -196,7 +193,7 @@ class AutopilotLink:
         self.clock: Final = clock
         self.target = target
         self.reply_timeout_s: Final = reply_timeout_s
-        self.seen: Final = VehicleMemory()
+        self.seen: Final = VehicleMemory(arming_checks=profile.arming_checks())
         self.paused_until_s = float("-inf")
         """End of the last time in which nothing was received because this program stalled: what arrives then is old."""
         self._listened_s = clock.now_s()
@@ -244,6 +241,20 @@ class AutopilotLink:
         """Name of the current block of its flight plan; empty if not reported."""
         names = {number: name for name, number in self.target.blocks.items()}
         return "" if self.seen.block is None else names.get(self.seen.block, f"block {self.seen.block}")
+
+    def explore(self) -> Mapping[str, int]:
+        """Return the blocks of its flight plan, if there is one. Raises VehicleError if a required one is missing."""
+        try:
+            return self.profile.explore(self.request, self.target)
+        except AutopilotError as error:
+            raise VehicleError(error.message, hint=error.hint) from error
+
+    def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
+        """Return those of `Autopilot.hover_limits`. Raises VehicleError for a parameter out of its range."""
+        try:
+            return self.profile.hover_limits(parameters)
+        except AutopilotError as error:
+            raise VehicleError(error.message, hint=error.hint) from error
 
     def send(self, *messages: Outgoing) -> None:
         """Send messages. Raises LinkError if the link is closed."""

@@ -3,8 +3,10 @@
 from itertools import takewhile
 from typing import Final, Literal
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Heartbeat
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.events import Action, Heartbeat, PacketReceived, confirms_motors_off
+from app.vehicles.mavlink.events import PacketReceived, confirms_motors_off
 from app.vehicles.mavlink.failures import DESCENDING_M_S, NOT_DESCENDING, NOT_DESCENDING_AFTER_S, REPEAT_S, land_every_s
 from app.vehicles.mavlink.radio import AutopilotLink
 

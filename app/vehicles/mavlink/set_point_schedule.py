@@ -9,16 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Position
 from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
 from app.core.formatting import count
 from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import (
-    Action,
-    ActionDone,
-    PerformAction,
-    Position,
-)
+from app.vehicles.mavlink.events import ActionDone, PerformAction
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.monitors.set_points import SetPointChange
 from app.vehicles.mavlink.states import replace

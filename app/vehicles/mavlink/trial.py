@@ -6,10 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.commands import Action, Outgoing, Target, read_parameter
+from app.autopilots.measurements import Position
 from app.vehicles.base import Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import Requester, StopRequest
 from app.vehicles.mavlink.events import (
-    Action,
     ActionRefused,
     Command,
     DuplicateVehicleDetected,
@@ -17,7 +18,6 @@ from app.vehicles.mavlink.events import (
     GainsRestored,
     PacketReceived,
     PerformAction,
-    Position,
     RecordSample,
     RequestGain,
     RestoreGains,
@@ -31,7 +31,6 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.profiles.base import Outgoing, Target
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import advance, begin
@@ -223,7 +222,7 @@ class TrialRunner:
                     radio = self._radio
                     radio.send(radio.profile.set_parameter(radio.target, setting.parameter, setting.value))
                 case RequestGain(parameter):
-                    self._radio.send(self._radio.profile.read_parameter(self._radio.target, parameter))
+                    self._radio.send(read_parameter(self._radio.target, parameter))
                 case RestoreGains():
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():

@@ -2,12 +2,12 @@
 
 from typing import Final
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Heartbeat
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
-    Action,
     Event,
     GainsRestored,
-    Heartbeat,
     PacketReceived,
     PerformAction,
     RestoreGains,

@@ -6,17 +6,16 @@ It depends on no autopilot and no clock: events carry their time, and commands a
 import dataclasses
 from typing import Final
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Measurement, Parameter
 from app.vehicles.flight_end import Landing
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
-    Action,
     Command,
     DuplicateVehicleDetected,
     Event,
-    Measurement,
     PacketReceived,
-    Parameter,
     PerformAction,
     RecordSample,
     RequestGain,

@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Position
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
-    Action,
     ActionDone,
     ActionRefused,
     Event,
     PerformAction,
-    Position,
     RequestGain,
     SetPointsPaused,
     WithdrawSetPoint,

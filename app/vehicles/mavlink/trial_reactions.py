@@ -7,18 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Parameter, Position
 from app.vehicles.end_texts import request_text
 from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import (
-    Action,
-    Event,
-    PacketReceived,
-    Parameter,
-    PerformAction,
-    Position,
-    SendGain,
-)
+from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GAIN_FAILURES, GROUND_M, RESPONSES, Failure, Finding, Reaction
 from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import TRANSITIONS, SafeGainsSent, State, Step, Trial

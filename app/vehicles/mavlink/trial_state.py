@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from app.autopilots.autopilot import ModeParameter
+from app.autopilots.commands import Setting
+from app.autopilots.measurements import Position
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import RECORDED_BEYOND_S
 from app.vehicles.end_texts import joined, request_text
 from app.vehicles.flight_end import Landing, StopRequest
-from app.vehicles.mavlink.events import Command, ModeParameter, Position, Setting
+from app.vehicles.mavlink.events import Command
 from app.vehicles.mavlink.failures import RESPONSES, Failure, Limits, Outcome
 from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
 from app.vehicles.mavlink.monitors.settings import SettingMonitor

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
+from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
@@ -13,7 +14,7 @@ from app.vehicles.flight_end import FlightEnd, Landing, withdrawn_by
 from app.vehicles.mavlink import flight_preparation, ground_observation, preflight, preparation, records
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.connection import VehicleConnection
-from app.vehicles.mavlink.events import Action, RecordSample
+from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flight_preparation import flies_steps
 from app.vehicles.mavlink.flown_set_points import Reference, with_flown_set_points
@@ -169,7 +170,7 @@ class MavlinkVehicle(VehicleConnection):
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         needed = preflight.evaluate_set_point_requirements(self._radio) if flies_steps(order) else ()
         watched, items = self._check(STANDSTILL_S)
-        hover = preflight.evaluate_hover(self._hover_throttle, self._radio.profile.hover_limits(self._loop))
+        hover = preflight.evaluate_hover(self._hover_throttle, self._radio.hover_limits(self._loop))
         needed = (*flight_preparation.evaluate_time(order, self._radio, self._options), *needed, *hover)
         self._quarantine.require_none()
         preflight.require((*items, *needed, preflight.evaluate_set_points(order.set_points)))

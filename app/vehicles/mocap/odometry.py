@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.dialects import COMMON, Message, is_known, number
 from app.core.clock import Clock
 from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.altitude_sources import SourceSample
-from app.vehicles.mavlink.dialects import COMMON, Message, is_known, number
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import Peer, open_transport
 from app.vehicles.mocap.addresses import StreamAddress

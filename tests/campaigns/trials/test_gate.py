@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.autopilots.experiments import get_experiment
 from app.campaigns import computation, proposals
-from app.core.experiments import get_experiment
 from app.core.experiments.base import prior_distribution
 from app.core.records.trajectory import Trajectory
 from app.db.models import CampaignRow, ProposalRow, VehicleRow

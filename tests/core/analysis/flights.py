@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.autopilots.ardupilot.flight import ardupilot_flight
+from app.autopilots.ardupilot.log import read_ardupilot
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import LEAD_S
 from app.core.control.ardupilot_parameters import Parameters
-from app.logs.ardupilot_flight import read_ardupilot_flight
 from bench.copters.simulation import SimulatedCopter, fly_steps
 from tests.logs.recorded import recorded
 
@@ -36,7 +37,7 @@ GUSTY = replace(QUIET, gust_m_s2=0.2, noise_m_s2=0.1, wander_m_s=0.01, wander_m=
 
 def recorded_steps() -> LoggedFlight:
     """The binary's flight with default gains, its 13 s of steps scored."""
-    flight = read_ardupilot_flight(io.BytesIO(recorded("arducopter_steps.bin")), name="steps.bin")
+    flight = ardupilot_flight(read_ardupilot(io.BytesIO(recorded("arducopter_steps.bin"))), "steps.bin")
     (segment,) = flight.segments
     rows = segment.time_s >= STEPS_BEGIN_S - LEAD_S
     names = type(segment).__slots__

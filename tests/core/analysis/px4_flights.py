@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from app.autopilots.px4.trace import read_px4_trace
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import FinerSegment
 from app.core.control.px4 import FLIGHT, GRAVITY, INPUTS, OUTPUTS
 from app.core.control.px4_parameters import Parameters
 from app.core.records.trajectory import Samples
-from app.logs.px4_trace import read_px4_trace
 from bench.copters.px4_simulation import Manoeuvre, fly_changes
 from bench.copters.simulation import SimulatedCopter
 

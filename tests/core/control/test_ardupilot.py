@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.trace import read_ardupilot_trace
 from app.core.control.ardupilot import (
     A_T,
     ACCELERATION_SUM,
@@ -33,7 +34,6 @@ from app.core.control.ardupilot import (
 )
 from app.core.control.ardupilot_parameters import POSITION_P, STEP_S, Packed, Parameters
 from app.core.control.ardupilot_replay import LoopTrace, replayed
-from app.logs.ardupilot_trace import read_ardupilot_trace
 
 TRACES = sorted((Path(__file__).parents[2] / "data" / "ardupilot_loop").glob("*.csv.gz"))
 TOLERANCES = np.array([1e-5, 2e-6, 1.2e-5, 4e-5, 1e-4, 0.01, 5e-5, 2e-5])

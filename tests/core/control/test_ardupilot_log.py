@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.core.control.ardupilot_log import COMPARED, SHAPED, LogComparison, LoopLog, compare_log
-from app.logs.ardupilot_log import read_ardupilot_log
 from tests.logs.recorded import recorded
 
 ARRAYS = (
@@ -18,7 +19,7 @@ ARRAYS = (
 @pytest.fixture(scope="module")
 def steps() -> LoopLog:
     """Two seconds around the command of the first step, which is 3 s after the first position target."""
-    log = read_ardupilot_log(io.BytesIO(recorded("arducopter_steps.bin")), name="steps.bin")
+    log = ardupilot_loop_log(read_ardupilot(io.BytesIO(recorded("arducopter_steps.bin"))), name="steps.bin")
     step_s = log.targets[1][0]
     return chosen(log, (log.time_s > step_s - 1.0) & (log.time_s < step_s + 1.0))
 

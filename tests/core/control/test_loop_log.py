@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 
+from app.autopilots.paparazzi.log import read_paparazzi
 from app.core.control import paparazzi as loop
 from app.core.control.loop_log import (
     FIELDS,
@@ -18,7 +19,6 @@ from app.core.control.loop_log import (
     infer_gains,
 )
 from app.core.policy import Gains
-from app.logs.paparazzi import read_loop_log
 from tests.logs.paparazzi_flights import Flight, data_of
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
@@ -34,8 +34,14 @@ def check_simulation(log: LoopLog) -> SimulationCheck | None:
     return None if found is None else found[0]
 
 
+def loop_in(data: str) -> LoopLog:
+    found = read_paparazzi(io.BytesIO(data.encode())).loop
+    assert found is not None
+    return found
+
+
 def log_of(flight: Flight) -> LoopLog:
-    return read_loop_log(io.BytesIO(data_of(flight).encode())).log
+    return loop_in(data_of(flight))
 
 
 def changed(log: LoopLog, name: str, rows: slice, by: int) -> LoopLog:
@@ -170,7 +176,7 @@ def flights_of(*gains: dict[str, int]) -> LoopLog:
         data_of(Flight(each, fly_s=8.0), start_s=12.0 + 20.0 * number).splitlines()[1:]
         for number, each in enumerate(gains)
     ]
-    return read_loop_log(io.BytesIO("\n".join(line for text in texts for line in text).encode())).log
+    return loop_in("\n".join(line for text in texts for line in text))
 
 
 def test_every_flight_has_the_gains_that_its_commands_follow_from() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.px4.trace import read_px4_trace
 from app.core.control.px4 import (
     ACCELERATION_TARGET,
     DISARMED,
@@ -33,7 +34,6 @@ from app.core.control.px4 import (
 from app.core.control.px4_parameters import Packed, Parameters
 from app.core.control.px4_replay import LoopTrace, replayed
 from app.core.records.trajectory import Samples
-from app.logs.px4_trace import read_px4_trace
 
 DATA = Path(__file__).parents[2] / "data" / "px4_loop"
 FLIGHTS = {

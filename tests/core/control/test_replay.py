@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.paparazzi.trace import read_loop_trace
 from app.core.control.paparazzi import (
     FB_CMD,
     FF_CMD,
@@ -24,7 +25,6 @@ from app.core.control.paparazzi import (
     replayed,
     step,
 )
-from app.logs.loop_trace import read_loop_trace
 
 TRACES = sorted((Path(__file__).parents[2] / "data" / "vertical_loop").glob("*.csv.gz"))
 

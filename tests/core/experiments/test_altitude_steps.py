@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from app.autopilots.experiments import get_experiment
 from app.core.definition import Definition, Flight, OptionValue
 from app.core.errors import TrajectoryError
-from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import Check, Envelope, ParameterDistribution, prior_distribution
 from app.core.experiments.takeoff import Takeoff
 from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, abort_steps
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
-from app.core.tuning.definition_checks import problems_of
-from app.core.tuning.proposals import next_proposal
 from app.vehicles.base import FlightOptions
 from app.vehicles.registry import open_vehicle
+from tests.core.tuning.defined import next_proposal, problems_of
 from tests.core.tuning.flying import compiled_only
 
 STEPS = AltitudeSteps()

@@ -6,16 +6,17 @@ from typing import Final
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.experiments import ArduPilotSteps
+from app.autopilots.experiments import get_experiment
+from app.autopilots.px4.experiments import Px4Steps
 from app.core.definition import Definition, Flight, OptionValue, Start
 from app.core.errors import InputError
-from app.core.experiments import get_experiment
-from app.core.experiments.altitude_steps_copters import ArduPilotSteps, Px4Steps
 from app.core.experiments.base import Check, Envelope, prior_distribution
 from app.core.experiments.copter_steps import CopterSteps
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
-from app.core.tuning.definition_checks import problems_of
 from app.core.tuning.gate import check_policy
+from tests.core.tuning.defined import problems_of
 from tests.core.tuning.flying import compiled_only
 
 NAMES: Final = ("altitude-steps-ardupilot", "altitude-steps-px4")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from app.autopilots.experiments import get_experiment
 from app.core.errors import TrajectoryError
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Envelope, prior_distribution
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.models.f16 import A, B, perturbed, transitions

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.experiments import EXPERIMENTS, get_experiment
 from app.core.definition import Definition
 from app.core.errors import InputError, TrajectoryError
-from app.core.experiments import EXPERIMENTS, get_experiment
 from app.core.experiments.base import Envelope, prior_distribution
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
-from app.core.tuning.definition_checks import problems_of
+from tests.core.tuning.defined import problems_of
 from tests.core.tuning.flying import compiled_only
 
 TAKEOFF = Takeoff()

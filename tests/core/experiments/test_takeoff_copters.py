@@ -7,18 +7,18 @@ from typing import Final
 import numpy as np
 import pytest
 
+from app.autopilots.experiments import get_experiment
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
-from app.core.experiments import get_experiment
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.campaign_models import known_distribution
-from app.core.tuning.definition_checks import check_definition, problems_of
 from app.core.tuning.gate import check_policy
-from app.core.tuning.proposals import advise, next_proposal
+from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
+from tests.core.tuning.defined import check_definition, next_proposal, problems_of
 
 PX4 = get_experiment("takeoff-px4")
 BY_HAND: Final = Definition(experiment="takeoff-px4", strategy="manual", stop=StopRule(kind="budget", max_flights=5))

@@ -3,10 +3,10 @@ import io
 import numpy as np
 import pytest
 
+from app.autopilots.readers import read_takeoff
 from app.core.models.set_points import SetPoints
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import Samples, Trajectory
-from app.logs.readers import read_takeoff
 from tests.logs.recorded import TLOGS, recorded
 
 TIME_S = np.arange(-1.0, 11.0)

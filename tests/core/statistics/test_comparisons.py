@@ -6,9 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from app.autopilots.px4.experiments import EXPERIMENTS
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
-from app.core.experiments.takeoff import TAKEOFF_PX4
 from app.core.statistics.comparisons import (
     FlightsToDecide,
     Group,
@@ -236,11 +236,11 @@ def test_a_pair_that_another_drones_scatter_would_tell_apart_is_not_known_yet_un
     assert compare(first, second, pool_scatter((first, second), by_another), 0.9).confidence == pytest.approx(
         0.939, abs=1e-3
     )
-    said = compare(first, second, pool_scatter((first, second), TAKEOFF_PX4.scatter), 0.9)
+    said = compare(first, second, pool_scatter((first, second), EXPERIMENTS[0].scatter), 0.9)
     assert (said.verdict, said.confidence, said.standard_error, said.further) == ("not known yet", None, None, None)
-    assert first.known_error(pool_scatter((first,), TAKEOFF_PX4.scatter)) is None
+    assert first.known_error(pool_scatter((first,), EXPERIMENTS[0].scatter)) is None
     again = group(0.541, 0.541 + 0.032 * 2**0.5)
-    own = pool_scatter((again, second), TAKEOFF_PX4.scatter)
+    own = pool_scatter((again, second), EXPERIMENTS[0].scatter)
     assert (own.known, own.degrees_of_freedom) == (True, 1.0)
     assert own.sigma == pytest.approx(0.032)
     assert compare(again, second, own, 0.9).verdict == "unresolved"

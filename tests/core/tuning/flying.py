@@ -9,9 +9,9 @@ from numba import config
 from app.core.definition import Definition, Flight
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains
-from app.core.tuning.proposals import next_proposal
 from app.core.tuning.stop_rules import decide_stop
 from app.core.tuning.strategy import Proposal
+from tests.core.tuning.defined import next_proposal
 
 TAKEOFF = Takeoff()
 

@@ -18,13 +18,12 @@ from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.campaign_models import changed_parameters, known_distribution
 from app.core.tuning.copter_model import CopterModel
-from app.core.tuning.flight_predictor import flight_predictor, modelled_flights
 from app.core.tuning.gate import check_policy
-from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategy import Proposal
 from app.core.tuning.trust_region import Box
 from bench.copters.campaign_flights import RIGS, CampaignRig
 from tests.core.analysis.px4_flights import CALM
+from tests.core.tuning.defined import fitted_predictor, modelled_flights, next_proposal
 from tests.core.tuning.flying import compiled_only
 
 AS_GOOD: Final = {
@@ -123,7 +122,7 @@ def test_several_flights_are_fitted_together_and_the_throttle_is_still_compared_
     assert both.fitted[1].standard_error < alone.fitted[1].standard_error
     assert both.spread.origin == "the fit to 2 flights"
     assert not both.is_worth_a_flight(*[steps.space.vector(proposal.gains)] * 2)
-    predictor = flight_predictor(definition_of(rig), flights)
+    predictor = fitted_predictor(definition_of(rig), flights)
     assert predictor is not None
     again = predictor.predict(proposal.gains)
     assert again.predicted_error == pytest.approx(flights[1].error, rel=0.1)

@@ -3,10 +3,10 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.core.definition import Definition, Donor, Start, StopRule
 from app.core.errors import InputError
-from app.core.experiments import EXPERIMENTS
-from app.core.tuning.definition_checks import check_definition, problems_of
+from tests.core.tuning.defined import check_definition, problems_of
 
 GOOD = Definition()
 

@@ -8,9 +8,9 @@ import pytest
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.tuning.calibration import MAX_FLIGHTS
-from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
-from app.core.tuning.proposals import next_proposal
+from app.core.tuning.flight_predictor import FlightPredictor
 from app.core.tuning.strategy import Proposal
+from tests.core.tuning.defined import fitted_predictor, modelled_flights, next_proposal, predict_repeat
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 pytestmark = compiled_only
@@ -21,7 +21,7 @@ STEPS = StopRule(kind="budget", max_flights=9)
 
 
 def predictor_of(definition: Definition, flights: list[Flight], donor: Flight | None = None) -> FlightPredictor:
-    found = flight_predictor(definition, flights, donor)
+    found = fitted_predictor(definition, flights, donor)
     assert found is not None
     return found
 
@@ -119,7 +119,7 @@ def test_gains_that_were_not_flown_are_no_repeat() -> None:
 
 
 def test_without_a_model_there_is_no_predictor() -> None:
-    assert flight_predictor(Definition(experiment="takeoff-px4", strategy="manual"), []) is None
+    assert predictor_of(Definition(experiment="takeoff-px4", strategy="manual"), []) is None
 
 
 def test_only_the_first_flight_and_those_of_the_fit_need_their_records() -> None:

@@ -10,9 +10,9 @@ from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.policy import Gains
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.landscape import Landscape, LandscapePlan, plan_grid, predict_points
+from app.core.tuning.landscape import Landscape, LandscapePlan, predict_points
 from app.core.tuning.predictions import predict_flight
-from app.core.tuning.proposals import next_proposal
+from tests.core.tuning.defined import next_proposal, plan_grid
 from tests.core.tuning.flying import compiled_only
 
 START: Gains = {"kp": 283, "ki": 13, "kd": 82}

@@ -4,17 +4,16 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.experiments import experiment_of, space_of
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.recorded_flight import ardupilot_loop, px4_loop
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.control.px4_parameters import Parameters as Px4Parameters
 from app.core.definition import Definition, LogEvidence, Start
-from app.core.experiments import experiment_of
 from app.core.experiments.base import prior_distribution
-from app.core.tuning.definition_checks import problems_of
-from app.core.tuning.gate import check_policy, space_of
-from app.core.tuning.proposals import next_proposal
+from app.core.tuning.gate import check_policy
+from tests.core.tuning.defined import next_proposal, problems_of
 
 VEHICLE = {
     "hover_throttle": (0.6, 0.002),

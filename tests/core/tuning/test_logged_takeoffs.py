@@ -8,10 +8,10 @@ from io import BytesIO
 import numpy as np
 import pytest
 
+from app.autopilots.readers import read_takeoff
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.logged_takeoffs import LoggedTakeoff, analyze_takeoffs
-from app.logs.readers import read_takeoff
 from tests.core.tuning.flying import compiled_only
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded

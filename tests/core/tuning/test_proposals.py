@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.experiments import experiment_of
 from app.core.definition import Definition, Flight, Start, StopRule
-from app.core.experiments import experiment_of
-from app.core.tuning.definition_checks import problems_of
 from app.core.tuning.gate import check_policy
-from app.core.tuning.proposals import advise, next_proposal
+from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
+from tests.core.tuning.defined import next_proposal, problems_of
 from tests.core.tuning.flying import ARDRONE, TAKEOFF, TWIN, campaign, compiled_only, errors, fly
 
 pytestmark = compiled_only

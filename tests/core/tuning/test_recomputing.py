@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
-from app.core.tuning.definition_checks import problems_of
 from app.core.tuning.predictions import prediction_of
-from app.core.tuning.proposals import advise, next_proposal
+from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
+from tests.core.tuning.defined import next_proposal, problems_of
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 pytestmark = compiled_only
@@ -25,9 +25,7 @@ WARM = Start(kind="campaign", gains=TUNED, donor=Donor(campaign_id=1, trial_numb
 
 DEFINITIONS = st.builds(
     Definition,
-    strategy=st.sampled_from(
-        sorted(name for name, strategy in STRATEGIES.items() if "takeoff" in (strategy.experiments or ("takeoff",)))
-    ),
+    strategy=st.sampled_from(sorted(name for name, strategy in STRATEGIES.items() if strategy.works_with(TAKEOFF))),
     start=st.sampled_from([Start(), WARM]),
     step_fraction=st.sampled_from([0.05, 1.0]),
     stop=st.builds(StopRule, kind=st.sampled_from(["paper", "noise", "budget"]), max_flights=st.just(4)),

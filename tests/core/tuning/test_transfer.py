@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.experiments import get_experiment
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
-from app.core.experiments import get_experiment
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.campaign_models import as_flown
 from app.core.tuning.corrected_model import correct_by_bias
-from app.core.tuning.proposals import next_proposal
 from app.core.tuning.transfer import transfer
 from tests.core.tuning import bowl
+from tests.core.tuning.defined import next_proposal
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 TUNED: dict[str, float] = {"kp": 1600, "ki": 900, "kd": 150}

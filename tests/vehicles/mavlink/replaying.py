@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from app.vehicles.mavlink.dialects import PAPARAZZI, Dialect, Message, source_system
+from app.autopilots.dialects import PAPARAZZI, Dialect, Message, source_system
 
 LOGS = Path(__file__).parents[2] / "data" / "logs"
 VEHICLE = 31

@@ -17,18 +17,17 @@ from typing import Final, Self
 
 import pytest
 
+from app.autopilots.dialects import Message, number, text
+from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.body import TICK_S, Make
+from app.autopilots.simulated.copter import Copter
 from app.core.policy import Gains
-from app.simdrone.body import TICK_S
-from app.simdrone.copter import Copter
 from app.simdrone.drone import Drone, Lockstep
 from app.simdrone.motion_capture import open_outlet
-from app.simdrone.registry import Make
 from app.vehicles import registry as open_module
 from app.vehicles.base import Identity, OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
-from app.vehicles.mavlink.dialects import Message, number, text
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
@@ -68,7 +67,7 @@ class _Heard:
     def __init__(self, autopilot: str) -> None:
         self.autopilot = autopilot
         self.heard: list[tuple[float, Message]] = []
-        self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
+        self._codec = AUTOPILOTS[autopilot].dialect.codec(system=1, component=1)
 
     def told(self, *kinds: str) -> list[Message]:
         return [message for _, message in self.heard if message.get_type() in kinds]
@@ -122,7 +121,7 @@ class LockstepRig(Lockstep, _Heard):
 
     def link(self, target_system: int | None = None) -> Link:
         """As another ground station has it."""
-        address, dialect = parse(str(self.options()["address"])), PROFILES[self.autopilot].dialect
+        address, dialect = parse(str(self.options()["address"])), AUTOPILOTS[self.autopilot].dialect
         return Link(address, dialect, clock=self, target_system=target_system, transport=self)
 
     def switch_on_failsafes(self) -> None:

@@ -4,8 +4,8 @@ import socket
 from types import TracebackType
 from typing import Final, Self
 
+from app.autopilots.dialects import Dialect, FieldValue, Message
 from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
-from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message
 from app.vehicles.mavlink.link import Link, Received
 from tests.ports import free_port
 from tests.waiting import Waits, wait_for

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.experiments import get_experiment
+from app.autopilots.dialects import number
+from app.autopilots.experiments import get_experiment
+from app.autopilots.simulated.copter_parameters import Parameters
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
-from app.simdrone.copter_parameters import Parameters
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, VehicleError
 from app.vehicles.flight_end import Failure, Landing, StopRequest
-from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import compiled_only

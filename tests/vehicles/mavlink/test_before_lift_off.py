@@ -4,15 +4,11 @@ from collections.abc import Callable
 
 import pytest
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import Position
 from app.vehicles.base import FlightRecord
 from app.vehicles.flight_end import Landing, StopRequest
-from app.vehicles.mavlink.events import (
-    Action,
-    ActionRefused,
-    Position,
-    SecondaryAltitudeReceived,
-    StopRequested,
-)
+from app.vehicles.mavlink.events import ActionRefused, SecondaryAltitudeReceived, StopRequested
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import end_of
 from app.vehicles.mavlink.trial_state import State, Trial

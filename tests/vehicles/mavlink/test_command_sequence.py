@@ -2,10 +2,11 @@
 
 from typing import cast
 
-from app.vehicles.mavlink.events import Action, ActionDone, CommandReply, Heartbeat, Measurement, PacketReceived
+from app.autopilots.commands import Action, Target
+from app.autopilots.measurements import CommandReply, Heartbeat, Measurement
+from app.autopilots.registry import AUTOPILOTS
+from app.vehicles.mavlink.events import ActionDone, PacketReceived
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Target
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from tests.clocks import SimulatedClock
 from tests.vehicles.mavlink.test_repeated_command import Sent
@@ -19,7 +20,7 @@ class Commanded:
     def __init__(self, autopilot: str, action: Action) -> None:
         self.clock, self.sent = SimulatedClock(), Sent()
         link = cast("Link", self.sent)
-        self.radio = AutopilotLink(link, PROFILES[autopilot], self.clock, Target(system=1, aircraft=1))
+        self.radio = AutopilotLink(link, AUTOPILOTS[autopilot], self.clock, Target(system=1, aircraft=1))
         self.clock.wait_s(10.0)
         self.sequence = CommandSequence(action, self.radio.profile.steps(action, self.radio.target), self.radio)
 
@@ -46,7 +47,7 @@ class Commanded:
 
 def test_a_reply_received_before_the_message_was_sent_confirms_nothing() -> None:
     commanded = Commanded("paparazzi", Action.FLY_TO)
-    reply = CommandReply(PROFILES["paparazzi"].steps(Action.FLY_TO, commanded.radio.target)[0].awaits, accepted=True)
+    reply = CommandReply(AUTOPILOTS["paparazzi"].steps(Action.FLY_TO, commanded.radio.target)[0].awaits, accepted=True)
     assert commanded.hear(reply, age_s=0.1) is None
     assert commanded.hear(reply) is not None
 

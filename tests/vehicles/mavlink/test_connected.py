@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from app.autopilots.dialects import number
+from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.mavlink.dialects import number
-from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
@@ -201,7 +201,7 @@ class LossyRig(LockstepRig):
     def arriving(self, frames: list[bytes]) -> list[bytes]:
         if self.now_s() >= self.lost_until_s:
             return frames
-        codec = PROFILES[self.autopilot].dialect.codec(system=1, component=1)
+        codec = AUTOPILOTS[self.autopilot].dialect.codec(system=1, component=1)
         return [frame for frame in frames if codec.parse(frame)[0].get_type() != "AUTOPILOT_VERSION"]
 
 

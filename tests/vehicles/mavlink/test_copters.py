@@ -11,15 +11,15 @@ from pathlib import Path
 
 import pytest
 
+from app.autopilots.dialects import Message
+from app.autopilots.measurements import VehicleEvent
+from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, Px4ArmingChecks
+from app.autopilots.px4.simulated import Px4
+from app.autopilots.simulated.body import OutgoingMessage
 from app.simdrone import faults
-from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
-from app.simdrone.px4 import Px4
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY, ArmingChecks
-from app.vehicles.mavlink.dialects import Message
-from app.vehicles.mavlink.events import VehicleEvent
 from app.vehicles.mavlink.vehicle import STANDSTILL_S, MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from tests.vehicles.flying import never, unwatched
@@ -420,7 +420,7 @@ def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events:
             rig.drone.autopilot._send_check_events = lambda: None  # type: ignore[attr-defined]  # as before release 1.14
         with connected(rig) as vehicle:
             vehicle.attend(4.0)
-            vehicle._radio.seen.arming_checks = ArmingChecks()
+            vehicle._radio.seen.arming_checks = Px4ArmingChecks()
             rig.drone.autopilot.refuses_arming = True
             [own] = [item for item in vehicle.check() if item.name == "own_checks"]
             messages = "messages: Preflight Fail: Arming denied: resolve system health failures first"

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from app.simdrone.body import OutgoingMessage
-from app.simdrone.paparazzi import Paparazzi
+from app.autopilots.dialects import FieldValue
+from app.autopilots.paparazzi.simulated import Paparazzi
+from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.body import OutgoingMessage
 from app.vehicles.base import CheckItem, SafeGainsError
-from app.vehicles.mavlink.dialects import FieldValue
-from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import TUNED, never, unwatched
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -35,9 +35,9 @@ def autopilot_of(rig: LockstepRig) -> Paparazzi:
 
 def enter(rig: LockstepRig, block: int) -> None:
     """As another ground station does."""
-    codec = PROFILES["paparazzi"].dialect.codec(system=254, component=1)
+    codec = AUTOPILOTS["paparazzi"].dialect.codec(system=254, component=1)
     fields: dict[str, FieldValue] = {"target_system": 31, "target_component": 0, "seq": block, "name": ""}
-    rig.drone.receive(codec.pack(PROFILES["paparazzi"].dialect.message("SCRIPT_ITEM", fields)))
+    rig.drone.receive(codec.pack(AUTOPILOTS["paparazzi"].dialect.message("SCRIPT_ITEM", fields)))
 
 
 def reference(vehicle: MavlinkVehicle) -> CheckItem:

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from app.simdrone.body import Autopilot, Body, OutgoingMessage
-from app.simdrone.paparazzi import HOME, NAV, Paparazzi
-from app.simdrone.registry import Make
+from app.autopilots.dialects import Message, number
+from app.autopilots.paparazzi.simulated import HOME, NAV, Paparazzi
+from app.autopilots.simulated.body import Body, Make, OutgoingMessage, SimulatedAutopilot
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, VehicleError
-from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, never, unwatched
@@ -23,7 +22,7 @@ LAND_HERE = 13
 def old_plan(*, max_distance_m: float = 5.5, sends_mode: bool = False) -> Make:
     """Its HOME mode begins right behind the radius of a trial, while it lands."""
 
-    def make(body: Body, system: int) -> Autopilot:
+    def make(body: Body, system: int) -> SimulatedAutopilot:
         return Paparazzi(body, system=system, max_distance_m=max_distance_m, sends_mode=sends_mode)
 
     return make
@@ -57,7 +56,7 @@ def test_one_heartbeat_of_a_pilot_keeps_no_quarantined_vehicle_from_being_told_t
 ) -> None:
     """Whichever of the two was the last one before the quarantine."""
 
-    def make(body: Body, system: int) -> Autopilot:
+    def make(body: Body, system: int) -> SimulatedAutopilot:
         return kind(body, system=system, max_distance_m=5.5)
 
     with LockstepRig(make=make, faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:

@@ -7,11 +7,10 @@ from typing import Final
 
 import pytest
 
+from app.autopilots.commands import Action, Target
+from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import FlightOptions, Identity
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.mavlink.events import Action
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Target
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, copter_of
@@ -32,7 +31,7 @@ def left_in_the_air(autopilot: str) -> Iterator[LockstepRig]:
         else:
             rig.switch_on_failsafes()
             rig.wait_s(15.0)  # until its estimator is ready, and its plan has set the ground reference
-            profile, target = PROFILES[autopilot], Target(system=1, aircraft=1)
+            profile, target = AUTOPILOTS[autopilot], Target(system=1, aircraft=1)
             with rig.link(target_system=1) as link:
                 for action in (Action.ARM, Action.TAKE_OFF):
                     for outgoing in (sent for step in profile.steps(action, target) for sent in step.sends):

@@ -14,10 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.clock import ScaledClock
-from app.core.errors import InputError
-from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
-from app.vehicles.mavlink.dialects import (
+from app.autopilots.dialects import (
     ARDUPILOTMEGA,
     COMMON,
     PAPARAZZI,
@@ -27,6 +24,9 @@ from app.vehicles.mavlink.dialects import (
     number,
     text,
 )
+from app.core.clock import ScaledClock
+from app.core.errors import InputError
+from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
 from app.vehicles.mavlink.link import (
     MAX_QUEUED_MESSAGES,
     UNATTENDED_AFTER_S,

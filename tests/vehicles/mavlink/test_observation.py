@@ -1,5 +1,5 @@
+from app.autopilots.measurements import Battery, Heartbeat
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import Battery, Heartbeat
 from tests.vehicles.mavlink.monitors.observing import told, watch_of
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
 

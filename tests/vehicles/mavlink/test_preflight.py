@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.autopilot import AutopilotError
+from app.autopilots.measurements import Position
+from app.autopilots.registry import AUTOPILOTS
 from app.core.models.set_points import SetPoints
-from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.events import Position
 from app.vehicles.mavlink.ground_observation import GroundObservation, find_reception
 from app.vehicles.mavlink.preflight import evaluate_hover, evaluate_set_points
-from app.vehicles.mavlink.profiles import PROFILES
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))
 STRANGE = (replace(HEARD[0], time_boot_s=3661.0), replace(HEARD[0], time_boot_s=0.2))
@@ -38,21 +38,21 @@ def test_a_push_is_limited(push_m_s2: float, passed: bool) -> None:
 
 @pytest.mark.parametrize(("hover", "hint"), [(0.62, ""), (0.742, "Set MPC_THR_HOVER to 0.74. "), (0.85, "to 0.80. ")])
 def test_the_hover_throttle_of_the_last_flight_must_be_within_what_px4_finds(hover: float, hint: str) -> None:
-    (item,) = evaluate_hover(hover, PROFILES["px4"].hover_limits({"MPC_THR_HOVER": 0.5}))
+    (item,) = evaluate_hover(hover, AUTOPILOTS["px4"].hover_limits({"MPC_THR_HOVER": 0.5}))
     assert (item.passed, bool(item.hint)) == (not hint, bool(hint))
     assert hint in item.hint
     assert item.needed.startswith("within MPC_THR_HOVER ± HTE_THR_RANGE, 0.30 … 0.70")
 
 
 def test_a_hover_throttle_that_is_not_known_or_has_no_limits_is_not_checked() -> None:
-    assert evaluate_hover(None, (0.3, 0.7)) == evaluate_hover(0.9, PROFILES["px4"].hover_limits({})) == ()
+    assert evaluate_hover(None, (0.3, 0.7)) == evaluate_hover(0.9, AUTOPILOTS["px4"].hover_limits({})) == ()
     for name in ("ardupilot", "paparazzi"):
-        assert evaluate_hover(0.9, PROFILES[name].hover_limits({"MOT_THST_HOVER": 0.3})) == ()
+        assert evaluate_hover(0.9, AUTOPILOTS[name].hover_limits({"MOT_THST_HOVER": 0.3})) == ()
 
 
 def test_a_range_that_px4_cannot_have_is_a_refusal_of_the_flight() -> None:
-    with pytest.raises(VehicleError, match="HTE_THR_RANGE: must be 0 to 1"):
-        PROFILES["px4"].hover_limits({"MPC_THR_HOVER": 0.5, "HTE_THR_RANGE": 1.5})
+    with pytest.raises(AutopilotError, match="HTE_THR_RANGE: must be 0 to 1"):
+        AUTOPILOTS["px4"].hover_limits({"MPC_THR_HOVER": 0.5, "HTE_THR_RANGE": 1.5})
 
 
 def test_copies_that_arrive_late_are_not_the_last_position_on_the_ground() -> None:

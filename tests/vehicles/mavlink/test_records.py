@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from app.autopilots.measurements import Position
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.glitches import find_glitches
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.mavlink.events import Position, RecordSample
+from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.records import add_secondary_altitude, trajectory_of
 
 ZERO_S = 700.0

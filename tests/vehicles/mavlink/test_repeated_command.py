@@ -6,10 +6,11 @@ from typing import Any, cast
 
 import pytest
 
-from app.vehicles.mavlink.events import Action, BlockEntered, Heartbeat, Measurement, PacketReceived, Position
+from app.autopilots.commands import Action, Target
+from app.autopilots.measurements import BlockEntered, Heartbeat, Measurement, Position
+from app.autopilots.registry import AUTOPILOTS
+from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Target
 from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from tests.clocks import SimulatedClock
@@ -35,7 +36,7 @@ class Ordered:
         self.clock, self.sent = SimulatedClock(), Sent()
         blocks = {"land here": 13, "land": LANDED_BLOCK, "Takeoff": 4}
         self.radio = AutopilotLink(
-            cast("Link", self.sent), PROFILES[autopilot], self.clock, Target(system=1, aircraft=1, blocks=blocks)
+            cast("Link", self.sent), AUTOPILOTS[autopilot], self.clock, Target(system=1, aircraft=1, blocks=blocks)
         )
         self.told(HEARTBEAT)
         self.clock.wait_s(0.1)

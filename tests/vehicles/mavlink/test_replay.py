@@ -6,31 +6,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.commands import Action, Setting
+from app.autopilots.dialects import source_system
+from app.autopilots.measurements import Position
+from app.autopilots.registry import AUTOPILOTS
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.dialects import source_system
 from app.vehicles.mavlink.events import (
-    Action,
     ActionDone,
     Command,
     Event,
     GainsRestored,
     PacketReceived,
     PerformAction,
-    Position,
     RecordSample,
     RestoreGains,
-    Setting,
     Tick,
 )
 from app.vehicles.mavlink.failures import Failure, Limits
-from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.trial_machine import advance, begin
 from app.vehicles.mavlink.trial_state import Plan, State, Trial
 from tests.vehicles.mavlink.replaying import FLOWN, GROUND_STATION, LOGS, Recorded, messages, read, recorded
 
-PAPARAZZI = PROFILES["paparazzi"]
+PAPARAZZI = AUTOPILOTS["paparazzi"]
 TAKEOFFS = Path(__file__).parents[2] / "data" / "takeoffs"
 TAKEOFF = Takeoff()
 LIMITS = Limits(
@@ -164,7 +163,7 @@ def test_land_is_told_when_it_was_and_the_ground_is_recognised_soon(
 
 def heard(log: str, autopilot: str) -> list[PacketReceived]:
     """What the vehicle sent in a log."""
-    profile = PROFILES[autopilot]
+    profile = AUTOPILOTS[autopilot]
     vehicle = [each for each in read(LOGS / log, profile.dialect) if source_system(each.message) != GROUND_STATION]
     return [PacketReceived(profile.measure(each.message), each.time_s) for each in vehicle]
 
@@ -198,7 +197,7 @@ def test_a_recorded_fall_whose_altitude_steps_is_a_fall_and_not_the_gains() -> N
 def test_a_recorded_drift_on_the_ground_after_arming_is_no_takeoff_and_no_quarantine() -> None:
     """0.45 m in 3.6 s, while its landed state was on the ground: its motors were not stopped, because it was taken to
     be in the air."""
-    px4 = PROFILES["px4"]
+    px4 = AUTOPILOTS["px4"]
     packets = heard("px4_ground_drift_after_arming.tlog.gz", "px4")
     limits = replace(LIMITS, heartbeat_s=1.0, flying_modes=px4.flying_modes, landing_modes=px4.landing_modes, blocks={})
     limits = replace(limits, arming_blocks=frozenset(), flying_blocks=frozenset(), landing_blocks=frozenset())

@@ -5,19 +5,17 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from app.autopilots.commands import Action
+from app.autopilots.measurements import BlockEntered, Heartbeat, TargetAltitude
 from app.core.models.set_points import SetPoints
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.events import (
-    Action,
     ActionDone,
     ActionRefused,
-    BlockEntered,
     Command,
-    Heartbeat,
     PerformAction,
     SetPointsPaused,
     StopRequested,
-    TargetAltitude,
     WithdrawSetPoint,
 )
 from app.vehicles.mavlink.failures import Failure

@@ -5,10 +5,10 @@ from contextlib import closing
 
 import pytest
 
-from app.simdrone.body import Autopilot, Body
-from app.simdrone.paparazzi import Paparazzi
-from app.simdrone.paparazzi_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
-from app.simdrone.registry import Make
+from app.autopilots.dialects import number
+from app.autopilots.paparazzi.simulated import Paparazzi
+from app.autopilots.paparazzi.simulated_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
+from app.autopilots.simulated.body import Body, Make, SimulatedAutopilot
 from app.vehicles.base import (
     FlightOptions,
     FlightRecord,
@@ -17,7 +17,6 @@ from app.vehicles.base import (
     VehicleError,
 )
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -41,7 +40,7 @@ class DeafToCommands(Paparazzi):
 
 
 def of(kind: type[Paparazzi] = Paparazzi, **how: str | float) -> Make:
-    def make(body: Body, system: int) -> Autopilot:
+    def make(body: Body, system: int) -> SimulatedAutopilot:
         return kind(body, system=system, **how)  # type: ignore[arg-type]
 
     return make

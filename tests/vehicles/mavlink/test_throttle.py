@@ -8,21 +8,21 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from app.autopilots.autopilot import Autopilot
+from app.autopilots.dialects import FieldValue, Message, number
+from app.autopilots.measurements import Measurement, Throttle
+from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.simulated.body import OutgoingMessage
 from app.core.experiments.takeoff import Takeoff
 from app.simdrone import faults
-from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Sample
-from app.vehicles.mavlink.dialects import FieldValue, Message, number
-from app.vehicles.mavlink.events import Measurement, Throttle
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Profile
 from tests.vehicles.flying import Watcher, never
 from tests.vehicles.mavlink.replaying import FLOWN, messages
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 from tests.vehicles.mavlink.test_connected import connected
 
-AUTOPILOTS = sorted(PROFILES)
+NAMES = sorted(AUTOPILOTS)
 FLOWN_ON = ["paparazzi", *(pytest.param(other, marks=pytest.mark.complete) for other in ("ardupilot", "px4"))]
 """The everyday ring flies one of them."""
 ORDER = FlightOptions(seed=1, window_s=12.0)
@@ -34,17 +34,17 @@ TARGET: dict[str, FieldValue] = {
 }
 
 
-def measured(profile: Profile, kind: str, **fields: FieldValue) -> Measurement | None:
+def measured(profile: Autopilot, kind: str, **fields: FieldValue) -> Measurement | None:
     """What the profile makes of a message that came over the wire."""
     codec = profile.dialect.codec(system=1, component=1)
     [message] = codec.parse(codec.pack(profile.dialect.message(kind, fields)))
     return profile.measure(message)
 
 
-@pytest.mark.parametrize("autopilot", AUTOPILOTS)
+@pytest.mark.parametrize("autopilot", NAMES)
 @pytest.mark.parametrize(("percent", "share"), [(0, 0.0), (62, 0.62), (100, 1.0), (101, None), (0xFFFF, None)], ids=str)
 def test_percent_become_a_share_of_full_and_nothing_beyond(autopilot: str, percent: int, share: float | None) -> None:
-    found = measured(PROFILES[autopilot], "VFR_HUD", **HUD, throttle=percent)
+    found = measured(AUTOPILOTS[autopilot], "VFR_HUD", **HUD, throttle=percent)
     assert found == (None if share is None else Throttle(share))
 
 
@@ -55,7 +55,7 @@ def test_percent_become_a_share_of_full_and_nothing_beyond(autopilot: str, perce
 def test_px4_s_thrust_command_is_read_where_it_is_used_and_possible(
     thrust: float, mask: int, share: float | None
 ) -> None:
-    found = measured(PROFILES["px4"], "ATTITUDE_TARGET", **TARGET, thrust=thrust, type_mask=mask)
+    found = measured(AUTOPILOTS["px4"], "ATTITUDE_TARGET", **TARGET, thrust=thrust, type_mask=mask)
     assert found == (None if share is None else Throttle(share, exact=True))
 
 
@@ -64,7 +64,7 @@ def test_the_real_paparazzi_hovers_at_its_hover_throttle_and_reports_none_on_the
     gains: tuple[int, int, int],
 ) -> None:
     """One report every 1.3 s of two whole trials."""
-    found = [PROFILES["paparazzi"].measure(each.message) for each in messages(gains, "VFR_HUD", from_vehicle=True)]
+    found = [AUTOPILOTS["paparazzi"].measure(each.message) for each in messages(gains, "VFR_HUD", from_vehicle=True)]
     shares = [each.share for each in found if isinstance(each, Throttle)]
     assert len(shares) == len(found) >= 59
     assert (shares[0], shares[-1]) == (0.0, 0.0)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from app.autopilots.dialects import ARDUPILOTMEGA, PAPARAZZI, Dialect, FieldValue, Message, number, text
 from app.core.clock import ScaledClock
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, PAPARAZZI, Dialect, FieldValue, Message, number, text
 from app.vehicles.mavlink.link import Link, LinkError
 from app.vehicles.mavlink.tlog import TlogWriter, record
 from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, collect, heartbeat, position

@@ -6,29 +6,30 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.autopilot import ModeParameter
+from app.autopilots.commands import Action, Setting
+from app.autopilots.measurements import (
+    DISARMING,
+    Attitude,
+    BlockEntered,
+    CommandReply,
+    FenceBreach,
+    Heartbeat,
+    Parameter,
+    Position,
+)
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
-    DISARMING,
-    Action,
     ActionDone,
     ActionRefused,
-    Attitude,
-    BlockEntered,
-    CommandReply,
     DuplicateVehicleDetected,
-    FenceBreach,
-    Heartbeat,
-    ModeParameter,
-    Parameter,
     PerformAction,
-    Position,
     RequestGain,
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
-    Setting,
     StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure

@@ -6,28 +6,29 @@ from dataclasses import dataclass, field
 from functools import wraps
 from typing import ParamSpec, Self, TypeVar
 
-from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.boot_clock import WRAP_S
-from app.vehicles.mavlink.events import (
+from app.autopilots.commands import Action, Setting
+from app.autopilots.measurements import (
     DISARMING,
-    Action,
-    ActionDone,
     Battery,
-    Command,
     CommandReply,
-    Event,
-    GainsRestored,
     Heartbeat,
     LandedState,
     Measurement,
-    PacketReceived,
     Parameter,
-    PerformAction,
     Position,
+)
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.boot_clock import WRAP_S
+from app.vehicles.mavlink.events import (
+    ActionDone,
+    Command,
+    Event,
+    GainsRestored,
+    PacketReceived,
+    PerformAction,
     RecordSample,
     RequestGain,
     SendGain,
-    Setting,
     Tick,
 )
 from app.vehicles.mavlink.failures import Limits

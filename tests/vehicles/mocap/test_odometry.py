@@ -7,10 +7,10 @@ from contextlib import closing
 
 import pytest
 
+from app.autopilots.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, FieldValue
 from app.core.clock import ScaledClock
 from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, FieldValue
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mocap import odometry

@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, OptionValue, Vehicle, VehicleError
-from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink import opening
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle
@@ -30,7 +32,8 @@ ORDER = FlightOptions(seed=1, window_s=RECORD_S - RECORDED_BEYOND_S)
 @pytest.fixture(autouse=True)
 def generic_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that differs from PX4 is the make in the heartbeat."""
-    monkeypatch.setattr(type(PROFILES["px4"]), "autopilot", MAKE)
+    generic = replace(AUTOPILOTS["px4"], autopilot=MAKE)
+    monkeypatch.setattr(opening, "AUTOPILOTS", {**AUTOPILOTS, "px4": generic})
 
 
 def options_at(port: int) -> dict[str, OptionValue]:

@@ -2,9 +2,9 @@
 
 import pytest
 
-from app.simdrone.body import Body
-from app.simdrone.paparazzi import HOME, NAV, Paparazzi
-from app.simdrone.paparazzi_plan import HOME_HEIGHT_M
+from app.autopilots.paparazzi.simulated import HOME, NAV, Paparazzi
+from app.autopilots.paparazzi.simulated_plan import HOME_HEIGHT_M
+from app.autopilots.simulated.body import Body
 from tests.simdrone.ground import Ground, flying
 from tests.simdrone.paparazzi import ARMED, LAND, LAND_HERE, Pilot, from_vehicle
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from app.core.experiments import EXPERIMENTS
+from app.core.experiments.base import Experiment
 from app.core.tuning.strategies.calibrated import CALIBRATED
 from app.core.tuning.strategies.gradient import GRADIENT
 from app.core.tuning.strategies.identified import IDENTIFIED
@@ -17,9 +17,7 @@ STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType(
 )
 
 
-def recommended_strategy(experiment: str) -> str:
-    """Name of the first strategy that works with the experiment; that of the takeoff if there is no such experiment."""
-    known = EXPERIMENTS.get(experiment)
-    return next(
-        (name for name, each in STRATEGIES.items() if known is not None and each.works_with(known)), CALIBRATED.name
-    )
+def recommended_strategy(experiment: Experiment | None) -> str:
+    """Name of the first strategy that works with the experiment; that of the takeoff without one."""
+    fitting = (name for name, each in STRATEGIES.items() if experiment is not None and each.works_with(experiment))
+    return next(fitting, CALIBRATED.name)

@@ -17,7 +17,7 @@ from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.campaign_model import CampaignModel
-from app.core.tuning.campaign_models import MODELS
+from app.core.tuning.campaign_models import FITS, fit_of
 from app.core.tuning.gate import allows
 from app.core.tuning.predictions import FlightPrediction
 from app.core.tuning.strategy import ErrorsOf, Explanation, Kind, ModelPrediction, PredictionOf, Proposal, Strategy
@@ -88,9 +88,10 @@ def flight_model(_definition: Definition, experiment: ModelledExperiment, flight
 
 
 def _fitted(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CampaignModel:
-    if experiment.name not in MODELS:
-        raise TypeError(f"calibrated works only with {', '.join(MODELS)}, not with {experiment.name}")
-    return MODELS[experiment.name](experiment, flights)
+    fit = fit_of(experiment)
+    if fit is None:
+        raise TypeError(f"calibrated does not work with {experiment.name}")
+    return fit(experiment, flights)
 
 
 def _predict(model: CampaignModel, gains: Vector) -> ModelPrediction:
@@ -201,5 +202,5 @@ CALIBRATED: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
-    experiments=tuple(MODELS),
+    kinds=tuple(FITS),
 )

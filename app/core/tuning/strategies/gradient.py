@@ -16,6 +16,8 @@ import numpy as np
 
 from app.core.definition import Definition, Flight, Option, aborted_by_gains, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
+from app.core.experiments.pitch_tracking import PitchTracking
+from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.campaign_models import known_distribution
@@ -291,5 +293,5 @@ GRADIENT: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
-    experiments=("takeoff", "altitude-steps", "pitch-tracking"),
+    kinds=(VerticalLoop, PitchTracking),
 )

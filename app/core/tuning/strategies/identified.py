@@ -241,5 +241,5 @@ IDENTIFIED: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
-    experiments=("pitch-tracking",),
+    kinds=(PitchTracking,),
 )

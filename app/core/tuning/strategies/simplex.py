@@ -8,6 +8,8 @@ import numpy as np
 
 from app.core.definition import Definition, Flight, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
+from app.core.experiments.pitch_tracking import PitchTracking
+from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import model_optimum, uncorrected_model
@@ -67,6 +69,6 @@ SIMPLEX: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
-    experiments=("takeoff", "altitude-steps", "pitch-tracking"),
+    kinds=(VerticalLoop, PitchTracking),
     corrects_model=False,
 )

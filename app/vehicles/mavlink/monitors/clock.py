@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
+from app.autopilots.measurements import Position
 from app.vehicles.mavlink.boot_clock import (
     AHEAD_S,
     BACK_S,
@@ -12,7 +13,6 @@ from app.vehicles.mavlink.boot_clock import (
     OtherClock,
     may_have_begun,
 )
-from app.vehicles.mavlink.events import Position
 from app.vehicles.mavlink.failures import Failure, Finding, Limits
 from app.vehicles.mavlink.states import replace
 

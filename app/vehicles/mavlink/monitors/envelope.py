@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.mavlink.events import Position
+from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import Failure, Finding, Limits
 from app.vehicles.mavlink.states import replace
 

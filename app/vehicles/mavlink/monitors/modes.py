@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.mavlink.events import Heartbeat, Position
+from app.autopilots.measurements import Heartbeat, Position
 from app.vehicles.mavlink.failures import Failure, Finding, Limits
 from app.vehicles.mavlink.states import replace
 

@@ -7,7 +7,7 @@ previous kind.
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.mavlink.events import Position
+from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding, Limits
 from app.vehicles.mavlink.monitors.clock import FRESH_S
 from app.vehicles.mavlink.states import replace

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.mavlink.events import Heartbeat, Measurement, Position, TargetAltitude
+from app.autopilots.measurements import Heartbeat, Measurement, Position, TargetAltitude
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.states import replace
 

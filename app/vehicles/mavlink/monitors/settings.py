@@ -4,7 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.vehicles.mavlink.events import ModeParameter, Parameter, Setting
+from app.autopilots.autopilot import ModeParameter
+from app.autopilots.commands import Setting
+from app.autopilots.measurements import Parameter
 from app.vehicles.mavlink.failures import Failure, Finding, Limits
 from app.vehicles.mavlink.states import replace
 

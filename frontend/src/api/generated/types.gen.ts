@@ -143,6 +143,58 @@ export type Advice = {
 };
 
 /**
+ * AutopilotInfo
+ *
+ * An autopilot over MAVLink.
+ */
+export type AutopilotInfo = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Label
+     *
+     * title with the vehicle that usually has it
+     */
+    label: string;
+    /**
+     * Experiments
+     *
+     * those that tune its gains, the default first
+     */
+    experiments: Array<string>;
+    /**
+     * Address
+     *
+     * usual address of a vehicle
+     */
+    address: string;
+    /**
+     * Simulated Address
+     *
+     * usual address of a simulated one
+     */
+    simulated_address: string;
+    /**
+     * Recordings
+     *
+     * what the controller check takes of it
+     */
+    recordings: string;
+    /**
+     * Recording Types
+     *
+     * file types of these
+     */
+    recording_types: Array<string>;
+};
+
+/**
  * BestTrial
  *
  * The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
@@ -485,6 +537,10 @@ export type Catalogue = {
      * Vehicle Kinds
      */
     vehicle_kinds: Array<VehicleKindInfo>;
+    /**
+     * Autopilots
+     */
+    autopilots: Array<AutopilotInfo>;
     /**
      * Presets
      */

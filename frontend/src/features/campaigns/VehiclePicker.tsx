@@ -1,6 +1,7 @@
 import { Anchor, Button, Input } from "@mantine/core";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
+import { useCatalogue } from "../../api/queries";
 import type { Vehicle, VehicleKindInfo } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
 import { autopilotTitle } from "../fleet/fleet";
@@ -21,6 +22,7 @@ interface Props {
 
 /** Selection of a registered vehicle or a shared simulation. */
 export function VehiclePicker({ kinds, registered, others, kind, vehicleId, error, onKind, onVehicle }: Props) {
+  const { data: catalogue } = useCatalogue();
   return (
     <div>
       <Input.Wrapper size="md" label="Vehicle" labelElement="div" error={error}>
@@ -31,7 +33,7 @@ export function VehiclePicker({ kinds, registered, others, kind, vehicleId, erro
               isReal={vehicle.is_real}
               checked={vehicle.id === vehicleId}
               name={vehicle.name}
-              line={autopilotTitle(vehicle)}
+              line={autopilotTitle(catalogue, vehicle)}
               onChoose={() => onVehicle(vehicle)}
             >
               <VehicleStateBadge vehicle={vehicle} />

@@ -4,11 +4,11 @@ import { useEffect, useRef, useState } from "react";
 import { useNavigate } from "react-router";
 import { type RecordingCheck, useCheckExample } from "../../api/checks";
 import { problemOf } from "../../api/problems";
+import { useCatalogue } from "../../api/queries";
 import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import classes from "./Checks.module.css";
-import { RECORDINGS } from "./checks";
 
 interface Props {
   upload: RecordingCheck;
@@ -22,6 +22,7 @@ interface Props {
 /** Upload form for a recording, with an introduction and an example. */
 export function CheckForm({ upload, onCheck, over, brief }: Props) {
   const example = useCheckExample();
+  const autopilots = useCatalogue().data?.autopilots ?? [];
   const navigate = useNavigate();
   return (
     <Panel
@@ -38,16 +39,16 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
         Drop a file here or choose one. The file is not stored.
       </Text>
       <ul className={page["notes"]}>
-        {RECORDINGS.map(({ autopilot, text }) => (
-          <li key={autopilot}>
-            {autopilot}: {text}.
+        {autopilots.map(({ name, title, recordings }) => (
+          <li key={name}>
+            {title}: {recordings}.
           </li>
         ))}
       </ul>
       <Group gap={10} align="end" mt={12} mb={10}>
         <FileButton
           multiple
-          accept={RECORDINGS.flatMap(({ types }) => types).join()}
+          accept={autopilots.flatMap(({ recording_types }) => recording_types).join()}
           onChange={(files) => onCheck(files)}
         >
           {(props) => (

@@ -5,25 +5,6 @@ import type { FigureTable } from "../../api/types";
 import { gainText, NOTHING } from "../../ui/format";
 import type { StateLabel } from "../../ui/states";
 
-/** The recordings that can be checked: one entry per autopilot, with the file types of the file chooser. */
-export const RECORDINGS = [
-  {
-    autopilot: "Paparazzi",
-    types: [".data", ".log", ".csv", ".gz", "text/csv"],
-    text: "the .data file with VERT_LOOP messages (add its .log, which contains the gains), or a trace with a row for every control step, .csv or .csv.gz",
-  },
-  {
-    autopilot: "ArduCopter",
-    types: [".bin", ".csv", ".gz"],
-    text: "the .bin log of a flight in GUIDED, or a trace with a row for every control step, .csv or .csv.gz",
-  },
-  {
-    autopilot: "PX4",
-    types: [".ulg", ".csv", ".gz"],
-    text: "the .ulg log of a flight, or a trace with a row for every position estimate, .csv or .csv.gz",
-  },
-] as const;
-
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {
   log: "Flight log",
   trace: "Step-by-step trace",

@@ -2,6 +2,7 @@ import { Anchor, Button, Stack, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { Link } from "react-router";
 import { useActs, useEditVehicle } from "../../api/fleet";
+import { useCatalogue } from "../../api/queries";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
 import { useVehicleStatus } from "../../live/store";
@@ -28,6 +29,7 @@ export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boo
   const status = aged?.status;
   const message = aged === null ? null : messageText(aged);
   const { identity } = vehicle;
+  const { data: catalogue } = useCatalogue();
   return (
     <Panel
       title="Connection"
@@ -64,7 +66,7 @@ export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boo
         {message !== null && <Note>{message}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
         <Note>
-          {autopilotTitle(vehicle)} at {String(vehicle.options["address"] ?? "")}
+          {autopilotTitle(catalogue, vehicle)} at {String(vehicle.options["address"] ?? "")}
           {identity !== null && `; identified as system ${identity.system_id}`}
           {identity?.version && `, version ${identity.version}`}
           {identity?.uid && `, hardware id ${identity.uid}`}

@@ -14,7 +14,6 @@ import { FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
 import { FormErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import {
-  AUTOPILOTS,
   autopilotOf,
   gainsFor,
   isSimulated,
@@ -78,7 +77,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
       <div className={classes["pair"]}>
         <SelectField
           label={LABELS["options.autopilot"]}
-          data={AUTOPILOTS}
+          data={catalogue.autopilots.map(({ name, label }) => ({ value: name, label }))}
           value={autopilotOf(form)}
           error={reasons["options.autopilot"]}
           onChange={(value) => setForm(withAutopilot(form, catalogue, value))}
@@ -101,7 +100,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           label={LABELS["options.simulated"]}
           checked={simulated}
           error={reasons["options.simulated"]}
-          onChange={(event) => setForm(withSimulation(form, event.currentTarget.checked))}
+          onChange={(event) => setForm(withSimulation(form, catalogue, event.currentTarget.checked))}
         />
       </div>
       <GainFields

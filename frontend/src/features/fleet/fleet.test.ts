@@ -29,6 +29,20 @@ const catalogue = {
     },
     { name: "takeoff-px4", gains: [{ name: "MPC_Z_P", default: 1 }] },
   ],
+  autopilots: [
+    {
+      name: "paparazzi",
+      experiments: ["takeoff", "altitude-steps"],
+      address: "udp:192.168.1.1:4245@4244",
+      simulated_address: "udp:127.0.0.1:4245@4244",
+    },
+    {
+      name: "px4",
+      experiments: ["takeoff-px4"],
+      address: "udpin:127.0.0.1:14550",
+      simulated_address: "udpin:127.0.0.1:14550",
+    },
+  ],
   vehicle_kinds: [
     {
       name: "mavlink",
@@ -53,11 +67,11 @@ test("another autopilot brings its own gains and usual address, and nobody has l
 });
 
 test("a simulated vehicle has its autopilot's usual address too, whichever was chosen first", () => {
-  const simulated = withSimulation(startingVehicle(catalogue), true);
+  const simulated = withSimulation(startingVehicle(catalogue), catalogue, true);
   expect(simulated.options["address"]).toBe("udp:127.0.0.1:4245@4244");
   const px4 = withAutopilot(simulated, catalogue, "px4");
   expect(px4.options["address"]).toBe("udpin:127.0.0.1:14550");
-  expect(withSimulation(px4, false).options["address"]).toBe("udpin:127.0.0.1:14550");
+  expect(withSimulation(px4, catalogue, false).options["address"]).toBe("udpin:127.0.0.1:14550");
 });
 
 test("an address that somebody has typed stays with another autopilot", () => {

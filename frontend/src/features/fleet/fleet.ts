@@ -98,24 +98,13 @@ export function purposeOf({ purpose, asked }: Pick<GivenGains, "purpose" | "aske
   return Object.keys(asked).length === 0 ? "Found at connection, nothing sent" : PURPOSES[purpose];
 }
 
-const PAPARAZZI_ADDRESS = "udp:192.168.1.1:4245@4244";
-const SIMULATED_ADDRESS = "udp:127.0.0.1:4245@4244";
-/** Of ArduCopter and PX4, simulated ones too. */
-const LISTENED_ADDRESS = "udpin:127.0.0.1:14550";
-
-function usualAddress(autopilot: string, simulated: boolean): string {
-  if (autopilot !== "paparazzi") return LISTENED_ADDRESS;
-  return simulated ? SIMULATED_ADDRESS : PAPARAZZI_ADDRESS;
+function usualAddress({ autopilots }: Catalogue, autopilot: string, simulated: boolean): string {
+  const found = autopilots.find(({ name }) => name === autopilot);
+  return (simulated ? found?.simulated_address : found?.address) ?? "";
 }
 
-export const AUTOPILOTS = [
-  { value: "paparazzi", label: "Paparazzi (AR.Drone 2)" },
-  { value: "ardupilot", label: "ArduCopter" },
-  { value: "px4", label: "PX4" },
-] as const;
-
-export function autopilotTitle({ options }: Pick<Vehicle, "options">): string {
-  return AUTOPILOTS.find(({ value }) => value === options["autopilot"])?.label ?? "";
+export function autopilotTitle(catalogue: Catalogue | undefined, { options }: Pick<Vehicle, "options">): string {
+  return catalogue?.autopilots.find(({ name }) => name === options["autopilot"])?.label ?? "";
 }
 
 const KIND = "mavlink";
@@ -131,13 +120,13 @@ export interface VehicleForm {
 }
 
 export function autopilotOf({ options }: Pick<VehicleForm, "options">): string {
-  return String(options["autopilot"] ?? "paparazzi");
+  return String(options["autopilot"] ?? "");
 }
 
 /** Gains of this autopilot's takeoff. */
-export function gainsFor(catalogue: Catalogue, autopilot: string) {
-  const name = autopilot === "paparazzi" ? "takeoff" : `takeoff-${autopilot}`;
-  return catalogue.experiments.find((experiment) => experiment.name === name)?.gains ?? [];
+export function gainsFor({ autopilots, experiments }: Catalogue, autopilot: string) {
+  const takeoff = autopilots.find(({ name }) => name === autopilot)?.experiments[0];
+  return experiments.find(({ name }) => name === takeoff)?.gains ?? [];
 }
 
 function defaultGains(catalogue: Catalogue, autopilot: string): Record<string, NumberEntry> {
@@ -145,10 +134,11 @@ function defaultGains(catalogue: Catalogue, autopilot: string): Record<string, N
 }
 
 export function startingVehicle(catalogue: Catalogue): VehicleForm {
+  const autopilot = catalogue.autopilots[0]?.name ?? "";
   return {
     name: "",
-    options: { autopilot: "paparazzi", address: PAPARAZZI_ADDRESS, simulated: false },
-    safeGains: defaultGains(catalogue, "paparazzi"),
+    options: { autopilot, address: usualAddress(catalogue, autopilot, false), simulated: false },
+    safeGains: defaultGains(catalogue, autopilot),
     confirmed: false,
     statement: "",
   };
@@ -158,23 +148,25 @@ export function startingVehicle(catalogue: Catalogue): VehicleForm {
 export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot: string): VehicleForm {
   return {
     ...form,
-    options: withUsualAddress({ ...form.options, autopilot }),
+    options: withUsualAddress(catalogue, { ...form.options, autopilot }),
     safeGains: defaultGains(catalogue, autopilot),
     confirmed: false,
   };
 }
 
 /** The options with the usual address of their vehicle, unless the address was edited. */
-function withUsualAddress(options: VehicleForm["options"]): VehicleForm["options"] {
-  const isUsual = [PAPARAZZI_ADDRESS, SIMULATED_ADDRESS, LISTENED_ADDRESS].includes(String(options["address"]));
+function withUsualAddress(catalogue: Catalogue, options: VehicleForm["options"]): VehicleForm["options"] {
+  const isUsual = catalogue.autopilots.some(
+    ({ address, simulated_address }) => options["address"] === address || options["address"] === simulated_address,
+  );
   return isUsual
-    ? { ...options, address: usualAddress(autopilotOf({ options }), options["simulated"] === true) }
+    ? { ...options, address: usualAddress(catalogue, autopilotOf({ options }), options["simulated"] === true) }
     : options;
 }
 
 /** Register a simulation or a real vehicle: updates an unedited address. */
-export function withSimulation(form: VehicleForm, simulated: boolean): VehicleForm {
-  return { ...form, options: withUsualAddress({ ...form.options, simulated }) };
+export function withSimulation(form: VehicleForm, catalogue: Catalogue, simulated: boolean): VehicleForm {
+  return { ...form, options: withUsualAddress(catalogue, { ...form.options, simulated }) };
 }
 
 /** The local port that an address needs for itself; the whole address if it names none. */

@@ -6,10 +6,10 @@ import pytest
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import uncorrected_model
-from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies.identified import error_model
 from app.core.tuning.strategy import Proposal
 from app.vehicles.f16 import LOG_NOISE
+from tests.core.tuning.defined import next_proposal
 from tests.core.tuning.flying import compiled_only
 from tests.core.tuning.test_identification import MODEL, flight
 from tests.vehicles.flying import HAND, TRACKING

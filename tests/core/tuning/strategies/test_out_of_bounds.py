@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.core.definition import Definition
-from app.core.experiments import EXPERIMENTS
-from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies import STRATEGIES
+from tests.core.tuning.defined import next_proposal
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
 from tests.core.tuning.test_identification import flight
 from tests.vehicles.flying import HAND

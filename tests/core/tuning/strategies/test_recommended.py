@@ -1,5 +1,6 @@
 import pytest
 
+from app.autopilots.experiments import EXPERIMENTS
 from app.core.tuning.strategies import recommended_strategy
 
 
@@ -14,4 +15,4 @@ from app.core.tuning.strategies import recommended_strategy
     ],
 )
 def test_an_experiment_recommends_the_first_strategy_that_works_with_it(experiment: str, strategy: str) -> None:
-    assert recommended_strategy(experiment) == strategy
+    assert recommended_strategy(EXPERIMENTS.get(experiment)) == strategy

@@ -1,7 +1,7 @@
 """What is remembered of messages, one after the other."""
 
+from app.autopilots.measurements import Measurement, Position
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import Measurement, Position
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.walking import LIMITS
 

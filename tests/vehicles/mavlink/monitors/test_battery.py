@@ -1,4 +1,4 @@
-from app.vehicles.mavlink.events import Battery
+from app.autopilots.measurements import Battery
 from tests.vehicles.mavlink.monitors.observing import told, watch_of
 
 

@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import pytest
 
-from app.vehicles.mavlink.events import Position
+from app.autopilots.measurements import Position
 from app.vehicles.mavlink.monitors.climb import ClimbMonitor
 
 

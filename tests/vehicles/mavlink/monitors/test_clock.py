@@ -1,5 +1,5 @@
+from app.autopilots.measurements import Battery, Heartbeat, Position
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import Battery, Heartbeat, Position
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import START_S, told, watch_of

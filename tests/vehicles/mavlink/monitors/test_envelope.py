@@ -1,7 +1,7 @@
 import pytest
 
+from app.autopilots.measurements import FenceBreach, Position
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import FenceBreach, Position
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import START_S, told, watch_of
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS

@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from app.vehicles.mavlink.events import Heartbeat
+from app.autopilots.measurements import Heartbeat
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import told, watch_of

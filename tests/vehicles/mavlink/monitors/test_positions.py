@@ -1,7 +1,7 @@
 from dataclasses import replace
 
+from app.autopilots.measurements import Position
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import Position
 from tests.vehicles.mavlink.monitors.observing import watch_of
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
 

@@ -1,4 +1,6 @@
-from app.vehicles.mavlink.events import ModeParameter, Parameter, Setting
+from app.autopilots.autopilot import ModeParameter
+from app.autopilots.commands import Setting
+from app.autopilots.measurements import Parameter
 from app.vehicles.mavlink.failures import Finding
 from app.vehicles.mavlink.monitors.settings import SettingMonitor
 from tests.vehicles.mavlink.walking import LIMITS

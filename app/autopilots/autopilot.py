@@ -1,0 +1,242 @@
+"""What is known of one autopilot: gains, modes, requirements, how its messages are read, and what is sent to it."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from app.autopilots import commands, mavlink
+from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
+from app.autopilots.dialects import Dialect, Message
+from app.autopilots.gains import GainSet
+from app.autopilots.measurements import Measurement, VehicleEvent
+from app.autopilots.simulated.body import SimulatedKind
+from app.core.errors import GainlineError
+from app.core.experiments.base import Experiment
+
+ReferenceSource = Literal["replica", "error", "target"]
+"""Source of an autopilot's own reference: the replica of its loop computes it; it sends its altitude error; it is the
+position target, which it sends."""
+
+AUTOPILOT: Final = 1
+"""Default component id of autopilots."""
+
+
+class AutopilotError(GainlineError):
+    """A vehicle cannot be flown by what is known of its autopilot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """Part of a failsafe that must be enabled before a flight: a parameter with one of these values, or else at least
+    `least`, by default above zero, at most `most`, and with all of these `bits`; or, if there are any `clear_bits`,
+    without these. `what`: these values, with their effect in brackets. `newer_name`: the parameter's name in newer
+    releases. `may_lack`: older releases lack it, and what it sets."""
+
+    parameter: str
+    what: str
+    values: frozenset[float] = frozenset()
+    bits: int = 0
+    clear_bits: int = 0
+    least: float = math.ulp(0.0)
+    most: float = math.inf
+    newer_name: str = ""
+    may_lack: bool = False
+
+    def is_met(self, value: float) -> bool:
+        if self.values:
+            return value in self.values
+        if self.clear_bits:
+            return not int(value) & self.clear_bits
+        return self.least <= value <= self.most and int(value) & self.bits == self.bits
+
+
+@dataclass(frozen=True, slots=True)
+class ModeParameter:
+    """Parameter that holds the vehicle's mode: `flying` is its value in flight, `modes` are others, named as in
+    Heartbeat."""
+
+    name: str
+    flying: float
+    modes: Mapping[float, str]
+
+
+class ArmingChecks:
+    """Latest results of a vehicle's own arming checks by its events; these are of one that reports them as status texts
+    alone."""
+
+    @property
+    def arming_modes(self) -> frozenset[str]:
+        """Modes in which it may arm; none without results."""
+        return frozenset()
+
+    def take(self, event: VehicleEvent) -> None:
+        """Note an event."""
+
+    def failing(self, _mode: str) -> tuple[str, ...]:
+        """Return the components that prevent arming in this mode."""
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class ChecksRequest:
+    """Command to run the arming checks and send the results as events, of which the last has the number `last`."""
+
+    command: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Autopilot:
+    """One autopilot as data and pure functions: it decides what is sent, not when. The defaults are those of autopilots
+    that fly by modes, without a flight plan in blocks, and execute Land and the command that stops the motors in every
+    mode."""
+
+    name: str
+    title: str
+    experiments: tuple[Experiment, ...]
+    """Experiments that tune its gains, the default first."""
+    dialect: Dialect
+    autopilot: int
+    """MAV_AUTOPILOT in its heartbeats."""
+    label: str
+    """Title where vehicles are registered, with the vehicle that usually has it."""
+    address: str = "udpin:127.0.0.1:14550"
+    """Usual address of a vehicle."""
+    simulated_address: str = "udpin:127.0.0.1:14550"
+    """Usual address of a simulated one."""
+    recordings: str
+    """What the controller check takes of it."""
+    recording_types: tuple[str, ...] = ()
+    """File types of these."""
+    sends_to_port: bool = False
+    """Whether it sends to a fixed port of this computer, which an address over UDP must name."""
+    heartbeat_s: float = 1.0
+    lift_off_s: float
+    """Time after the takeoff command for which it may still stand on the ground."""
+    land_again_s: float = 1.0
+    """Interval at which Land may be repeated, if every command restarts the landing: the time that the landing takes on
+    the ground to end."""
+    climbs_from_ground: bool = True
+    """Whether the altitude commanded is above the place of takeoff, rather than above the autopilot's origin."""
+    reference: ReferenceSource
+    """Where its own reference comes from."""
+
+    flying_modes: frozenset[str]
+    following_modes: frozenset[str]
+    """Modes that it may be in once it follows set points."""
+    hovering_modes: frozenset[str] = frozenset()
+    """Flying modes that it enters after the climb; none if it climbs and hovers in one mode."""
+    landing_modes: frozenset[str]
+    automatic_modes: frozenset[str]
+    """Modes in which it flies by itself. In any other, known or not, a pilot flies it."""
+    mode_names: Mapping[str, str]
+    """Display names of its modes by their names in `Heartbeat`; others are displayed by those."""
+    modes_without_land: Mapping[str, str] = field(default_factory=dict)
+    """Modes in which it does not execute Land, with a description of its behaviour in them."""
+    mode_parameter: ModeParameter | None = None
+    """Its mode as a parameter, if its heartbeats do not distinguish all modes."""
+
+    arming_blocks: frozenset[str] = frozenset()
+    """Blocks of its flight plan, if it has one, in which it stands on the ground before the takeoff."""
+    ground_blocks: tuple[str, ...] = ()
+    """Blocks of its flight plan that set its ground reference, in order: it passes through them by itself, and the
+    reference is set once it enters the last; none if arming sets the reference."""
+    flying_blocks: frozenset[str] = frozenset()
+    landing_blocks: frozenset[str] = frozenset()
+    landed_blocks: frozenset[str] = frozenset()
+    """Those of them that it enters once it has landed."""
+
+    gain_sets: tuple[GainSet, ...]
+    """The gains by their names in the releases of the autopilot, newest last; in the order of its experiment."""
+    parameter_component: int = AUTOPILOT
+    """Component that a PARAM_SET names. Some vehicles, such as MAVSDK's, ignore one to all components (0)."""
+    loop_parameters: tuple[tuple[str, ...], ...] = ()
+    """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set points.
+    None if the replica of its loop has no parameters but its gains."""
+    may_lack: frozenset[str] = frozenset()
+    """Those of them that some releases lack, whose replica then has their default."""
+    hover_limits: Callable[[Mapping[str, float]], tuple[float, float] | None] = lambda _parameters: None
+    """Returns the least and the largest hover throttle that its loop can find in flight with these parameters of it;
+    None without such limits: it keeps to what it is told or has learned. Raises AutopilotError for a parameter out of
+    its range."""
+
+    requirements: tuple[Requirement, ...] = ()
+    set_point_requirements: tuple[Requirement, ...] = ()
+    """Further requirements of flights with several set points."""
+    stop_settings: tuple[str, ...] = ()
+    """Settings that stop the motors, by their names in the releases; none if a command always does."""
+    takeoff_parameter: str = ""
+    """Parameter for the altitude of a takeoff; none if the command contains it."""
+    set_point_settings: tuple[Setting, ...] = ()
+    """Parameters required for a flight with several set points."""
+
+    readers: mavlink.Readers
+    """How its messages are read."""
+    telemetry: tuple[MessageRequest, ...] = ()
+    """Messages asked for, without lasting changes."""
+    set_point_telemetry: tuple[MessageRequest, ...] = ()
+    """Further ones for a flight with several set points."""
+    reports_version: bool = True
+    """Whether it replies to a request for its version; otherwise it sends that unrequested, or never."""
+    arming_checks: Callable[[], ArmingChecks] = ArmingChecks
+    checks: ChecksRequest | None = None
+    """None if unsupported: failed checks are then reported as status texts."""
+
+    steps: Callable[[Action, Target], tuple[Step, ...]]
+    """Returns the steps of an action. Raises KeyError if it needs a block of the flight plan that the target lacks."""
+    holds_first: bool = True
+    """Whether it must hold its first set point by position targets (`Action.HOLD`) before it flies to others."""
+    needs_stream: bool = False
+    """Whether it must receive its position target all the time while it follows set points."""
+    armable_mode: tuple[float, ...] = ()
+    """Mode, by its parameters of a command, that it must be switched to from all automatic ones but `hovering_modes`,
+    and from a pilot's mode in which it reports that it does not arm; none if arming begins with its mode."""
+    explore: Callable[[Ask, Target], Mapping[str, int]] = lambda _ask, _target: {}
+    """Returns the blocks of the flight plan, if there is one. Raises AutopilotError if a required one is missing."""
+    conclude: Callable[[Target], tuple[Outgoing, ...]] = lambda _target: ()
+    """Returns the messages that end an exploration, successful or not."""
+    refer_to_ground: Callable[[Target], tuple[Step, ...]] = lambda _target: ()
+    """Returns the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
+
+    simulated: Callable[[], tuple[SimulatedKind, ...]] = lambda: ()
+    """Loads its simulated counterparts, the default first."""
+
+    def measure(self, message: Message) -> Measurement | None:
+        """Read a message; None if it contains no measurement."""
+        return mavlink.read(self.readers, message)
+
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
+        """Return the steps that request telemetry, positions at this rate."""
+        return tuple(each.step(target, telemetry_hz) for each in self.telemetry)
+
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
+        """Return the steps that request the further telemetry of a flight with several set points."""
+        return tuple(each.step(target) for each in self.set_point_telemetry)
+
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+        """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
+        None if nothing."""
+        leaves = mode not in self.hovering_modes if mode in self.automatic_modes else may_arm is False
+        step = Step((commands.set_mode(target, *self.armable_mode),), awaits="command 176", needed=False)
+        return (step,) if self.armable_mode and leaves else ()
+
+    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
+        """Return the parameters required for a takeoff to the altitude of `target`."""
+        return (Setting(self.takeoff_parameter, target.altitude_m),) if self.takeoff_parameter else ()
+
+    def stream(self, target: Target) -> tuple[Outgoing, ...]:
+        """Return the messages that it must receive all the time while it follows set points."""
+        return (commands.position_target(target),) if self.needs_stream else ()
+
+    def version_request(self, target: Target) -> Outgoing | None:
+        """Return the request for its version, if it replies to that."""
+        return commands.request_version(target) if self.reports_version else None
+
+    def checks_request(self, target: Target) -> Outgoing | None:
+        """Return the request to run its arming checks, if it supports that."""
+        return None if self.checks is None else commands.command(target, self.checks.command)
+
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        """Return the message that sets a floating-point parameter, the type of all gains."""
+        return commands.set_parameter(target, parameter, value, component=self.parameter_component)

@@ -1,0 +1,193 @@
+"""The altitude steps in a telemetry log (.tlog) of an ArduCopter or PX4.
+
+It takes the same of them as our own link records: position, demanded throttle and the autopilot's reference, of a
+flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter's reference is shaped again from these.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
+from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, require_gains
+from app.autopilots.tlog import SOURCES
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.recorded_flight import (
+    LARGEST_INTERVAL_S,
+    Steps,
+    ardupilot_loop,
+    px4_loop,
+    read_ardupilot,
+    read_px4,
+)
+from app.core.analysis.segment import LEAD_S
+from app.core.control.ardupilot_parameters import NEWER_NAMES, in_newer_names, in_older_names
+from app.core.errors import Problem, TrajectoryError
+from app.core.models.set_points import SetPoints, on_step
+from app.core.records.trajectory import Samples, Trajectory
+
+_READ_LATE: Final = "was changed after the flight, and was not read before"
+_STEPS_APART_S: Final = 1.0
+_SETTLED_S: Final = 6.5
+"""Hover after the last step that is analysed."""
+_INTERRUPTED_S: Final = 1.0
+"""Longer intervals between two messages do not count for their rate."""
+
+
+def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
+    """The part with the largest altitude changes, at most 120 s under the same parameters, of an ArduPilot or PX4; None
+    of another autopilot.
+
+    Raises TrajectoryError naming every message, mode and parameter that is missing, or InputError for a parameter that
+    is not supported.
+    """
+    autopilot = AUTOPILOTS.get(recording.autopilot)
+    return None if autopilot is None else _Reader(name, recording, autopilot).read()
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    name: str
+    recording: Recording
+    autopilot: CopterAutopilot
+
+    def read(self) -> LoggedFlight:
+        if frame := self.recording.frame:
+            raise self._refused(Problem("file", f"is the log of {frame}, not of a copter with several rotors"))
+        if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
+            raise self._refused(*problems)
+        rows = CopterRows.of(self.recording, self.autopilot)
+        none_found = (
+            f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
+            "in one of the messages, a jump in altitude or a parameter change"
+        )
+        given, parts = choose_parts(
+            rows.time_s,
+            self._conditions(rows),
+            rows.is_reset,
+            ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
+            rows.target_rate_m_s,
+            self._refused_for,
+            ("LOCAL_POSITION_NED", none_found),
+        )
+        part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
+        require_gains(given, self.autopilot.bounds, self._refused_for, lambda _: _READ_LATE)
+        learned = self._learned(float(rows.time_s[part[0]]))
+        flight = self._flight(rows.trajectory(part), {**given, **learned})
+        return replace(flight, assumed=() if self.recording.has_all_parameters else self._assumed(given))
+
+    def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
+        if self.autopilot.shapes_reference:
+            loop = replace(ardupilot_loop(given), has_newer_names=self._has_newer_names)
+            return read_ardupilot(loop, trajectory, self._steps(trajectory))
+        hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
+        whole = Steps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
+        return read_px4(replace(px4_loop(given), vehicle=self.recording.system), trajectory, whole)
+
+    def _steps(self, trajectory: Trajectory) -> Steps:
+        """The steps from the first one before which the vehicle was at rest, to some time after the last; a step right
+        before the end is left out."""
+        time_s, target_m = trajectory.time_s, trajectory["set_point_m"]
+        found = steps_in(trajectory)
+        rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
+        field = "POSITION_TARGET_LOCAL_NED"
+        if not rows:
+            raise self._refused(
+                Problem(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
+            )
+        times_s = time_s[rows]
+        if np.any(np.diff(times_s) < _STEPS_APART_S):
+            raise self._refused(
+                Problem(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
+            )
+        end_s = time_s[found[len(rows)]] if len(found) > len(rows) else time_s[-1]
+        return Steps(
+            set_points=SetPoints(
+                times_s=(0.0, *map(on_step, times_s.tolist())),
+                altitudes_m=(float(target_m[rows[0] - 1]), *target_m[rows].tolist()),
+            ),
+            begin_s=float(times_s[0]),
+            end_s=min(float(times_s[-1]) + _SETTLED_S, float(end_s)),
+        )
+
+    def _conditions(self, rows: CopterRows) -> Sequence[Condition]:
+        return (
+            (rows.is_following, "HEARTBEAT", f"has no flight in {self._mode}"),
+            (rows.is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
+            (rows.is_off_ground, "LOCAL_POSITION_NED", f"never is {OFF_GROUND_M:g} m above the ground"),
+            (rows.lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
+        )
+
+    def _sparse_messages(self) -> Iterator[Problem]:
+        """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
+        for message in self.autopilot.messages:
+            found = [each.time_s for name, each in self.recording.columns.items() if SOURCES[name].message == message]
+            rate_hz = self._rate_hz(found[0]) if found else 0.0
+            if not found:
+                yield Problem(message, "is missing")
+            elif rate_hz * LARGEST_INTERVAL_S < 1.0:
+                rate = f"{rate_hz:.1f} times" if rate_hz else "less than once"
+                yield Problem(message, f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed")
+
+    def _rate_hz(self, at_s: Samples) -> float:
+        following = follows(self.recording, self.autopilot, at_s)
+        intervals_s = np.diff(at_s[following] if following.any() else at_s)
+        counted = intervals_s[intervals_s <= _INTERRUPTED_S]
+        return 1.0 / float(counted.mean()) if counted.size else 0.0
+
+    def _missing_mode(self) -> Iterator[Problem]:
+        armed, mode = self.recording.columns["is_armed"], self.recording.columns["mode"]
+        flown = [self.autopilot.number_of_mode(int(each)) for each in mode.values[armed.values > 0.0].tolist()]
+        if not flown:
+            yield Problem("HEARTBEAT", "never reports armed motors")
+        elif self.autopilot.mode not in flown:
+            modes = ", ".join(self.autopilot.mode_name(each) for each in dict.fromkeys(flown))
+            yield Problem(
+                "HEARTBEAT",
+                f"has no flight in {self._mode}, only in {modes}, where the messages do not determine the reference",
+            )
+
+    def _missing_parameters(self) -> Iterator[Problem]:
+        known = {name for _, name, _ in self._settings()}
+        for each in self.autopilot.required:
+            if each not in known:
+                newer = next(iter(in_newer_names({each: 0.0})))
+                renamed = f", nor {newer} of release 4.7" if newer != each else ""
+                yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
+
+    def _settings(self) -> Iterator[tuple[float, str, float]]:
+        """Parameters by their older names, in order of time; values that nobody had written before hold from −∞ on."""
+        logged = ((-np.inf if each.held_before else each.time_s, each) for each in self.recording.settings)
+        for time_s, each in sorted(logged, key=lambda timed: timed[0]):
+            older, number = in_older_names(each.name, each.value)
+            if older in self.autopilot.kept:
+                yield time_s, older, number
+
+    def _learned(self, time_s: float) -> Parameters:
+        """What the vehicle learns by itself, as last reported at this time, or reported first."""
+        reports = [(at_s, value) for at_s, name, value in self._settings() if name == self.autopilot.learned]
+        before = [value for at_s, value in reports if at_s <= time_s] or [value for _, value in reports[:1]]
+        return {self.autopilot.learned: before[-1]} if before else {}
+
+    def _assumed(self, given: Parameters) -> tuple[str, ...]:
+        """By the names of the vehicle's release."""
+        absent = [each for each in self.autopilot.usual if each not in {*given, self.autopilot.learned}]
+        return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
+
+    @property
+    def _has_newer_names(self) -> bool:
+        return any(each.name in NEWER_NAMES for each in self.recording.settings)
+
+    @property
+    def _mode(self) -> str:
+        return self.autopilot.mode_name(self.autopilot.mode)
+
+    def _refused_for(self, field: str, reason: str) -> TrajectoryError:
+        return self._refused(Problem(field, reason))
+
+    def _refused(self, *problems: Problem) -> TrajectoryError:
+        return TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)

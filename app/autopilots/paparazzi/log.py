@@ -1,0 +1,232 @@
+"""Paparazzi's ground log to a `Recording`.
+
+A log is a .data file, and its .log companion, XML, with the airframe and the settings. VERT_LOOP contains the complete
+state of the vertical loop, in its own integers; without it the altitude comes from ROTORCRAFT_FP.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice, pairwise, product
+from types import MappingProxyType
+from typing import BinaryIO, Final
+from xml.parsers import expat
+
+import numpy as np
+
+from app.autopilots.recording import Column, Event, EventKind, GainSets, Recording, Setting, increasing, own_names
+from app.core.control.loop_log import GAINS, FlownGains, LoopLog, flown_gains
+from app.core.control.paparazzi import FULL_THRUST
+from app.core.policy import Gains
+from app.core.records.trajectory import Samples
+from app.logs.base import refused
+from app.logs.paparazzi import PaparazziLines, number_in, read_lines
+
+MAX_COMPANION_BYTES: Final = 16 * 2**20
+_GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
+_AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
+_SETTINGS: Final = 256
+_MOST_CANDIDATES: Final = 32
+_PLATEAU_S: Final = 2.0
+
+PARAMETERS: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
+"""Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
+GAIN_SETS: Final[GainSets] = (own_names(*GAINS),)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaparazziRecording(Recording):
+    """With the samples of the vertical loop, None if they were not logged, and the gains that its commands follow from;
+    `are_logged`: all of these are in the log's files."""
+
+    loop: LoopLog | None
+    flown: Sequence[FlownGains]
+    are_logged: bool
+
+
+def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> PaparazziRecording:
+    """Decode a .data file and its companion, if given. The gains are those that the loop's commands follow from;
+    without VERT_LOOP those in the companion, as far as they are certain.
+
+    Raises TrajectoryError if either cannot be read.
+    """
+    lines = read_lines(stream)
+    configuration = _Configuration(lines.aircraft)
+    if companion is not None:
+        configuration.read(companion, lines.values)
+    loop = lines.loop_log() if lines.loop_time_s else None
+    flown = [] if loop is None else flown_gains(loop, configuration.candidates)
+    others = ", ".join(sorted(lines.others)[:5])
+    return PaparazziRecording(
+        title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
+        autopilot="paparazzi",
+        clock="ground",
+        columns=_columns(lines, loop),
+        from_ground=False,
+        gain_sets=GAIN_SETS,
+        settings=list(configuration.settings(flown)),
+        events=[] if loop is None else [*_starts(loop), *_ends(loop)],
+        notes=list(configuration.notes(flown)),
+        remarks=[f"other aircraft in the log left out: {others}"] if others else [],
+        loop=loop,
+        flown=flown,
+        are_logged=configuration.contains(flown),
+    )
+
+
+def _columns(lines: PaparazziLines, loop: LoopLog | None) -> dict[str, Column]:
+    """Columns of the loop, and of the position if its message is more frequent."""
+    channels = {} if loop is None else _loop_channels(loop)
+    columns = {name: Column(loop.time_s, values, "VERT_LOOP") for name, values in channels.items() if loop is not None}
+    if len(lines.loop_time_s) >= len(lines.time_s):
+        return columns
+    rows = increasing(np.array(lines.time_s))
+    time_s = np.array(lines.time_s)[rows]
+    return columns | {
+        "altitude_m": Column(time_s, np.array(lines.up)[rows] / 2**8, "ROTORCRAFT_FP.up"),
+        "climb_rate_m_s": Column(time_s, np.array(lines.up_speed)[rows] / 2**19, "ROTORCRAFT_FP.vup"),
+    }
+
+
+def _loop_channels(log: LoopLog) -> dict[str, Samples]:
+    """Altitudes in metres, positive up; commands as shares of full thrust."""
+    return {
+        "altitude_m": -log["z"] / 2**8,
+        "climb_rate_m_s": -log["zd"] / 2**19,
+        "set_point_m": -log["z_sp"] / 2**8,
+        "reference_m": -log["z_ref"] / 2**8,
+        "thrust": log["thrust"] / FULL_THRUST,
+        "feed_forward": log["ff_cmd"] / FULL_THRUST,
+        "feedback": log["fb_cmd"] / FULL_THRUST,
+    }
+
+
+def _starts(log: LoopLog) -> list[Event]:
+    """The last samples before the reference starts to move by itself."""
+    idle = log.idle
+    sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
+    return [Event(EventKind.TAKEOFF, float(log.time_s[place]), "the reference starting to move") for place in sets_out]
+
+
+def _ends(log: LoopLog) -> list[Event]:
+    """Times at which a set point that was held for two seconds changes, or the loop becomes inactive."""
+    idle, set_point = log.idle, log["z_sp"]
+    stops = np.flatnonzero(~idle[:-1] & idle[1:])
+    moments = [Event(EventKind.COMMAND, float(log.time_s[place]), "the loop being switched off") for place in stops]
+    held_since_s = float(log.time_s[0])
+    for place in np.flatnonzero(np.diff(set_point) != 0).tolist():
+        now_s, is_working = float(log.time_s[place]), not idle[place] and not idle[place + 1]
+        if is_working and now_s - held_since_s >= _PLATEAU_S:
+            moments.append(
+                Event(EventKind.COMMAND, now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m")
+            )
+        held_since_s = float(log.time_s[place + 1])
+    return moments
+
+
+@dataclass(slots=True)
+class _Configuration:
+    """Gains of one aircraft in a .log companion, which may describe several.
+
+    `known` are all values of each gain with the time from which they are known: built in, then reported (DL_VALUE) by
+    the setting's number, which counts all settings in the order of the generated file. Newer releases append that to
+    the .log. In other logs, some settings are missing and files are in another order, but each group has its own: there
+    the numbers of the gains are those whose first values are the gains built in. `is_certain`: the numbers are.
+    """
+
+    aircraft: str
+    known: dict[str, list[tuple[float, float]]] = field(default_factory=lambda: {gain: [] for gain in GAINS})
+    is_certain: bool = True
+    is_described: bool = True
+    _is_mine: bool = False
+    _groups: list[list[str]] = field(default_factory=lambda: [[]])
+    _generated: list[str] | None = None
+
+    @property
+    def candidates(self) -> list[Gains]:
+        """Gain sets of all values."""
+        sets = product(*({value for _, value in self.known[gain]} for gain in GAINS))
+        return [dict(zip(GAINS, each, strict=True)) for each in islice(sets, _MOST_CANDIDATES)]
+
+    def contains(self, flown: Sequence[FlownGains]) -> bool:
+        return all(each.gains is None or each.gains in self.candidates for each in flown)
+
+    def settings(self, flown: Sequence[FlownGains]) -> Iterator[Setting]:
+        """The gains flown, or else those reported. A report is late by up to one cycle of all settings, so a gain that
+        changed is unknown between the reports of two values, and after the last one."""
+        for change, gain in product(flown, GAINS):
+            yield Setting(change.after_s, gain, change.gains[gain] if change.gains else np.nan)
+        for gain, known in self.known.items() if self.is_certain and not flown else ():
+            yield from (Setting(since_s, gain, value) for since_s, value in known[:1])
+            for (before_s, before), (now_s, now) in pairwise(known):
+                if now != before:
+                    yield from (Setting(before_s, gain, np.nan), Setting(now_s, gain, now))
+            if len({value for _, value in known}) > 1:
+                yield Setting(known[-1][0], gain, np.nan)
+
+    def notes(self, flown: Sequence[FlownGains]) -> Iterator[str]:
+        if not self.is_described:
+            yield "the .log file does not describe this aircraft"
+        elif not self.is_certain and not flown:
+            yield "the .log file does not establish which settings the vehicle reported"
+        if not self.contains(flown):
+            yield "gains computed from the loop's commands"
+
+    def read(self, companion: BinaryIO, values: Sequence[tuple[float, int, float]]) -> None:
+        """Parse the companion. Raises TrajectoryError if it is not a .log file, or larger than 16 MiB."""
+        companion.seek(0)
+        text = companion.read(MAX_COMPANION_BYTES + 1)
+        if len(text) > MAX_COMPANION_BYTES:
+            raise refused("has a companion file of more than 16 MiB", "Add the .log file that was written with it.")
+        self.is_described = False
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = self._element
+        parser.EntityDeclHandler = _no_entities
+        try:
+            parser.Parse(text, True)
+        except (expat.ExpatError, ValueError) as error:
+            raise refused(
+                f"has a companion file that is not XML: {error}", "Add the .log file that was written with it, or none."
+            ) from error
+        numbers = self._numbers({number: value for _, number, value in reversed(values)})
+        self.is_certain = bool(numbers) or not values
+        for time_s, number, value in values:
+            if number in numbers:
+                self.known[numbers[number]].append((time_s, value))
+
+    def _numbers(self, first: Mapping[int, float]) -> dict[int, str]:
+        """The numbers of the gains, from the first value reported of each setting; empty if they are not certain."""
+        if self._generated is not None and max(first, default=0) < len(self._generated):
+            return {number: gain for number, gain in enumerate(self._generated) if gain}
+        built_in = {gain: known[0][1] for gain, known in self.known.items() if known}
+        groups = [each for each in self._groups if sorted(filter(None, each)) == sorted(GAINS) == sorted(built_in)]
+        found = []
+        for group, start in product(groups, range(_SETTINGS)):
+            numbers = {number: gain for number, gain in enumerate(group, start) if gain}
+            if all(first.get(number) == built_in[gain] for number, gain in numbers.items()):
+                found.append(numbers)
+        return found[0] if found and all(each == found[0] for each in found) else {}
+
+    def _element(self, tag: str, attributes: dict[str, str]) -> None:
+        given, kind = {name.lower(): value for name, value in attributes.items()}, tag.lower()
+        if kind == "aircraft":
+            self._is_mine = given.get("ac_id") == self.aircraft
+            self.is_described |= self._is_mine
+        elif not self._is_mine:
+            return
+        elif kind == "generated_settings":
+            self._generated = []
+        elif kind == "dl_settings":
+            self._groups.append([])
+        elif kind == "dl_setting":
+            match = _GAIN.fullmatch(given.get("var", "")) or _AIRFRAME_GAIN.fullmatch(given.get("param", ""))
+            group = self._groups[-1] if self._generated is None else self._generated
+            group.append(f"k{match[1].lower()}" if match else "")
+        elif kind == "define" and (match := _AIRFRAME_GAIN.fullmatch(given.get("name", ""))):
+            value = number_in(given.get("value", "").encode())
+            if np.isfinite(value):
+                self.known[f"k{match[1].lower()}"] = [(-np.inf, abs(value))]
+
+
+def _no_entities(*_declared: object) -> None:
+    raise ValueError("it declares entities")

@@ -1,0 +1,209 @@
+"""Telemetry of Paparazzi: messages, their periods and their peculiarities."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from app.autopilots.simulated.body import ARMED, Fields
+from app.core.control.paparazzi import POSITION_BITS, SPEED_BITS
+
+PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "LOCAL_POSITION_NED": 0.02,
+        "HEARTBEAT": 0.5,
+        "ATTITUDE": 0.5,
+        "GLOBAL_POSITION_INT": 0.9,
+        "SYS_STATUS": 1.2,
+        "VFR_HUD": 1.3,
+        "ATTITUDE_QUATERNION": 1.5,
+        "SYSTEM_TIME": 2.0,
+        "BATTERY_STATUS": 4.0,
+        "GPS_GLOBAL_ORIGIN": 5.1,
+        "AUTOPILOT_VERSION": 11.1,
+    }
+)
+"""Periods with a telemetry file for tuning."""
+
+BARE_POSITION_PERIOD_S: Final = 0.8
+"""Period without such a file."""
+
+_LATITUDE_E7: Final = 435641193
+_LONGITUDE_E7: Final = 14812804
+GROUND_MM: Final = 147_095
+"""Altitude of the place, and of the origin that the flight plan sets there."""
+_GEOID_MM: Final = 49817
+_KILL: Final = 0
+_FAILSAFE: Final = 1
+_GUIDED: Final = 19
+_BY_HAND: Final = 12
+_NO_TEMPERATURE: Final = 32767
+_NOISE_M_S: Final = 1.0 / (1 << SPEED_BITS)
+_NOISE_MS: Final = 20
+"""An estimate is never the same twice."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """State of the autopilot; heights in its local frame, up."""
+
+    boot_s: float
+    height_m: float
+    climb_rate_m_s: float
+    thrust: float
+    battery_v: float
+    mode: int
+    motors_on: bool
+    origin_mm: int
+    north_m: float
+    north_m_s: float
+    sends_mode: bool
+
+    @property
+    def boot_ms(self) -> int:
+        return int(self.boot_s * 1000.0)
+
+    @property
+    def battery_mv(self) -> int:
+        """Voltage in mV, in steps of 0.1 V."""
+        return math.floor(self.battery_v * 10.0) * 100
+
+
+def heartbeat(now: Snapshot) -> Fields:
+    """Return HEARTBEAT; NAV and HOME are equal in it unless it contains the mode's number."""
+    mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8, _BY_HAND: 64 | 16}.get(now.mode, 4)
+    return {
+        "type": 2,
+        "autopilot": 9,
+        "base_mode": mode | (ARMED if now.motors_on else 0),
+        "custom_mode": now.mode if now.sends_mode else 0,
+        "system_status": 4 if now.motors_on else 3,
+        "mavlink_version": 3,
+    }
+
+
+def local_position(now: Snapshot) -> Fields:
+    """Return LOCAL_POSITION_NED in steps of the autopilot's integers."""
+    return {
+        "time_boot_ms": now.boot_ms,
+        "x": _stepped(now.north_m, POSITION_BITS),
+        "y": 0.0,
+        "z": -_stepped(now.height_m, POSITION_BITS),
+        "vx": _stepped(now.north_m_s, SPEED_BITS),
+        "vy": 0.0,
+        "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS) - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
+    }
+
+
+def global_position(now: Snapshot) -> Fields:
+    """Return GLOBAL_POSITION_INT; as in the real one, `relative_alt` is altitude in mm minus the origin in m."""
+    altitude_mm = now.origin_mm + _GEOID_MM + round(now.height_m * 1000.0)
+    return {
+        "time_boot_ms": now.boot_ms,
+        "lat": _LATITUDE_E7,
+        "lon": _LONGITUDE_E7,
+        "alt": altitude_mm,
+        "relative_alt": altitude_mm - now.origin_mm // 1000 - 1,
+        "vx": 0,
+        "vy": 0,
+        "vz": _down_cm_s(now),
+        "hdg": 33,
+    }
+
+
+def vfr_hud(now: Snapshot) -> Fields:
+    """Return VFR_HUD, in which `climb` is positive downwards."""
+    return {
+        "airspeed": 0.0,
+        "groundspeed": 0.0,
+        "heading": 0,
+        "throttle": round(now.thrust * 100.0),
+        "alt": (now.origin_mm + _GEOID_MM) / 1000.0 + now.height_m,
+        "climb": -now.climb_rate_m_s,
+    }
+
+
+def sys_status(now: Snapshot) -> Fields:
+    errors = dict.fromkeys(("errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
+    return {
+        "onboard_control_sensors_present": 15,
+        "onboard_control_sensors_enabled": 15,
+        "onboard_control_sensors_health": 15,
+        "load": 65535,
+        "voltage_battery": now.battery_mv,
+        "current_battery": _current(now),
+        "battery_remaining": -1,
+        "drop_rate_comm": 0,
+        **errors,
+    }
+
+
+def battery_status(now: Snapshot) -> Fields:
+    return {
+        "id": 0,
+        "battery_function": 0,
+        "type": 0,
+        "temperature": _NO_TEMPERATURE,
+        "voltages": [now.battery_mv, *[0] * 9],
+        "current_battery": _current(now),
+        "current_consumed": 0,
+        "energy_consumed": 0,
+        "battery_remaining": -1,
+    }
+
+
+def attitude(now: Snapshot) -> Fields:
+    return {"time_boot_ms": now.boot_ms, "roll": 0.0, "pitch": 0.0, "yaw": 0.0, **_RATES}
+
+
+def attitude_quaternion(now: Snapshot) -> Fields:
+    return {"time_boot_ms": now.boot_ms, "q1": 1.0, "q2": 0.0, "q3": 0.0, "q4": 0.0, **_RATES}
+
+
+def system_time(now: Snapshot) -> Fields:
+    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
+
+
+def global_origin(now: Snapshot) -> Fields:
+    return {"latitude": _LATITUDE_E7, "longitude": _LONGITUDE_E7, "altitude": now.origin_mm}
+
+
+def version(_now: Snapshot) -> Fields:
+    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
+    numbers = dict.fromkeys(
+        ("capabilities", "middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id", "uid"), 0
+    )
+    return {"flight_sw_version": 51000, **numbers, **custom}
+
+
+_RATES: Final = {"rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
+
+MESSAGES: Final[Mapping[str, Callable[[Snapshot], Fields]]] = MappingProxyType(
+    {
+        "LOCAL_POSITION_NED": local_position,
+        "HEARTBEAT": heartbeat,
+        "ATTITUDE": attitude,
+        "GLOBAL_POSITION_INT": global_position,
+        "SYS_STATUS": sys_status,
+        "VFR_HUD": vfr_hud,
+        "ATTITUDE_QUATERNION": attitude_quaternion,
+        "SYSTEM_TIME": system_time,
+        "BATTERY_STATUS": battery_status,
+        "GPS_GLOBAL_ORIGIN": global_origin,
+        "AUTOPILOT_VERSION": version,
+    }
+)
+
+
+def _stepped(value: float, bits: int) -> float:
+    return round(value * (1 << bits)) / (1 << bits)
+
+
+def _down_cm_s(now: Snapshot) -> int:
+    return round(-now.climb_rate_m_s * 100.0)
+
+
+def _current(now: Snapshot) -> int:
+    """Return the current in 10 mA: that at hover in the recorded flights, proportional to thrust."""
+    return round(443 * now.thrust / 0.63)

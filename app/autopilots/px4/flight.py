@@ -1,0 +1,240 @@
+"""A whole flight's altitude control in PX4's log (.ulg), in every mode that follows an altitude.
+
+Rows are the set-points that position control publishes, ten a second by default, with the estimates of the same time.
+The accelerations between two rows are the change of the estimated climb rate: single estimates of the acceleration are
+noisy, and most are not logged.
+"""
+
+from dataclasses import fields, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
+from app.autopilots.recording import LONGEST_INTERVAL_S, Parameters, Recording, Refused, Rows, refusal
+from app.autopilots.segments import (
+    LARGEST_LEAN,
+    SHORTEST_PART_S,
+    choose_parts,
+    jumps,
+    require_gains,
+    thinned,
+)
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.px4_loop import SPACE, Px4Loop
+from app.core.analysis.segment import FinerSegment, Segment
+from app.core.control.px4 import FLIGHT, GRAVITY
+from app.core.control.px4_parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
+from app.core.records.trajectory import Samples
+
+_NEEDED: Final = (
+    "altitude_m", "climb_rate_m_s", "reference_m", "climb_rate_target_m_s", "acceleration_target_m_s2", "thrust_target",
+    "given_climb_rate_m_s", "given_acceleration_m_s2", "takeoff_state", "mode",
+)  # fmt: skip
+_OTHER_KINDS: Final = 2
+"""The first kind of vehicle that does not fly on rotors; a VTOL changes from one to the other."""
+_LEFT_OUT: Final = (12.0, 17.0, 18.0, 20.0)
+"""Modes: descend, takeoff, land, precision landing."""
+_JUMP_M: Final = 0.5
+_JUMP_M_S: Final = 2.0
+_EVERY_POSITION_S: Final = 0.0125
+"""Rows of the position that are not further apart than this are all that there were."""
+_SET_POINT_LASTS_S: Final = 1.0
+_NEAR_LIMIT: Final = 1e-3
+_LEAST_SHARE: Final = 0.2
+"""Of hover thrust: below it, the assumed hover thrust cannot be told from thrust and acceleration."""
+_HINT: Final = (
+    "Use PX4's .ulg log of a flight with altitude changes in Hold, Mission or Offboard mode, with bit 0 of "
+    "SDLOG_PROFILE set, its default. Takeoffs are left out: their ramp decides, not the gains."
+)
+
+
+def px4_flight(recording: Recording, name: str) -> LoggedFlight:
+    """The parts in flight under the same parameters, at most 120 s, those with the most manoeuvres first.
+
+    Raises TrajectoryError naming the topic or parameter that is missing, or InputError for one not supported.
+    """
+    refused = refusal(f"{name} cannot be analysed.", _HINT, recording.notes)
+    _require_columns(recording, refused)
+    rows, acceleration_target, lean = (
+        _rows(recording),
+        recording.columns["acceleration_target_m_s2"].values,
+        _lean(recording),
+    )
+    time_s, thrust = rows.time_s, rows.throttle
+    is_sound = np.isfinite(rows.z_m + rows.v_m_s + rows.v_t_m_s + acceleration_target + thrust)
+    is_sound &= (thrust >= 0.0) & (thrust <= 1.0)
+    conditions = (
+        (is_sound, TARGET, "has no rows of numbers beside positions"),
+        (_flying(recording, time_s), TAKEOFF, "never reports a flight: the log has no takeoff whose ramp was finished"),
+        (
+            ~(recording.at("vehicle_type", time_s) >= _OTHER_KINDS),
+            str(SOURCES["vehicle_type"]),
+            "is never that of a copter in flight",
+        ),
+        (
+            ~np.isin(recording.at("mode", time_s), _LEFT_OUT),
+            STATUS,
+            "has no mode in flight but takeoffs and landings, in which the ramp and the ground decide",
+        ),
+        (
+            np.isfinite(rows.z_d_m + rows.v_d_m_s + rows.a_d_m_s2),
+            str(SOURCES["reference_m"]),
+            "has no altitude to follow in flight, as in manual modes: fly in Hold, Mission or Offboard",
+        ),
+        (lean >= LARGEST_LEAN, f"{TARGET}.thrust", "leans by more than 30° throughout the flight"),
+    )
+    none_found = (
+        f"has no {SHORTEST_PART_S:g} s with an altitude to follow between takeoff and landing, without a gap of "
+        f"{LONGEST_INTERVAL_S:g} s, a reset of the estimator or a parameter change"
+    )
+    given, chosen = choose_parts(
+        time_s,
+        conditions,
+        _is_reset(recording, rows),
+        recording.history({*LOOP_NAMES, VEHICLE}),
+        _manoeuvres(rows),
+        refused,
+        (TARGET, none_found),
+    )
+    require_gains(given, SPACE.bounds, refused, lambda _: "is missing")
+    parameters = parameters_from(given)
+    limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
+    hover = _hover(rows, acceleration_target, is_sound & (thrust > limits[0]) & (thrust < limits[1]))
+    kept = [thinned(time_s, part) for part in chosen]
+    down = np.concatenate([recording.at("descent_limit_m_s", time_s)[each] for each in kept])
+    return LoggedFlight(
+        loop=Px4Loop(
+            parameters=parameters,
+            step_s=_step_s(recording.columns["altitude_m"].interval_s, given),
+            row_s=float(np.median(np.concatenate([np.diff(time_s[each]) for each in kept]))),
+            descent_m_s=float(np.median(down)) if np.isfinite(down).all() else parameters.descent_m_s,
+            hover_deviation=hover_deviation(given),
+            vehicle=int(given.get(VEHICLE, 1.0)),
+        ),
+        segments=[_segment(recording, replace(rows, assumed_hover=hover), lean, each) for each in kept],
+    )
+
+
+def _rows(recording: Recording) -> Segment:
+    """All rows of position control, without accelerations and the assumed hover thrust."""
+    columns = recording.columns
+    time_s = columns["thrust_target"].time_s
+    z_m, v_m_s = (
+        np.interp(time_s, columns[each].time_s, columns[each].values, left=np.nan, right=np.nan)
+        for each in ("altitude_m", "climb_rate_m_s")
+    )
+    v_d, a_d = _feed_forward(recording, time_s)
+    thrust, unknown = columns["thrust_target"].values, np.full(len(time_s), np.nan)
+    return Segment(
+        time_s=time_s,
+        z_m=z_m,
+        v_m_s=v_m_s,
+        a_m_s2=unknown,
+        z_d_m=columns["reference_m"].values,
+        v_d_m_s=v_d,
+        a_d_m_s2=a_d,
+        v_t_m_s=columns["climb_rate_target_m_s"].values,
+        throttle=thrust,
+        throttle_filtered=thrust,
+        assumed_hover=unknown,
+    )
+
+
+def _lean(recording: Recording) -> Samples:
+    """Cosine of the lean, shape (n,): the vertical share of the thrust."""
+    columns = recording.columns
+    thrust = columns["thrust_target"].values
+    horizontal = [
+        columns[each].values ** 2 for each in ("thrust_target_north", "thrust_target_east") if each in columns
+    ]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lean = thrust / np.sqrt(thrust**2 + np.sum(horizontal, axis=0))
+    return np.asarray(np.nan_to_num(lean, nan=1.0))
+
+
+def _flying(recording: Recording, time_s: Samples) -> Rows:
+    """Rows after the ramp of a takeoff, without contact to the ground."""
+    on_ground = [np.nan_to_num(recording.at(each, time_s)) > 0.0 for each in ("is_landed", "has_contact")]
+    return np.asarray((recording.at("takeoff_state", time_s) == FLIGHT) & ~np.any(on_ground, axis=0))
+
+
+def _is_reset(recording: Recording, rows: Segment) -> Rows:
+    """Rows at which the estimator moved altitude or climb rate."""
+    counters = [np.nan_to_num(recording.at(each, rows.time_s)) for each in ("altitude_resets", "climb_rate_resets")]
+    resets = np.sum(counters, axis=0)
+    return np.asarray(
+        (np.diff(resets, prepend=resets[0]) != 0.0)
+        | jumps(rows.time_s, rows.z_m, rows.v_m_s, _JUMP_M)
+        | (np.abs(np.diff(rows.v_m_s, prepend=rows.v_m_s[0])) > _JUMP_M_S)
+    )
+
+
+def _hover(rows: Segment, acceleration_target: Samples, free: Rows) -> Samples:
+    """Hover thrust that the loop assumed, shape (n,): thrust over that share of hover thrust which the acceleration
+    target asks for, from the rows that are `free` of the limits of the thrust."""
+    share = 1.0 + acceleration_target / float(GRAVITY)
+    known = np.flatnonzero(free & (share > _LEAST_SHARE))
+    if not known.size:
+        return np.full(len(rows.time_s), np.nan)
+    return np.interp(rows.time_s, rows.time_s[known], rows.throttle[known] / share[known])
+
+
+def _segment(recording: Recording, rows: Segment, lean: Samples, kept: NDArray[np.int64]) -> FinerSegment:
+    """These rows, with the thrust between them where it was logged more often."""
+    part = rows.part(kept)
+    time_s, changes = part.time_s, np.diff(part.v_m_s) / np.diff(part.time_s)
+    at_s, thrust = time_s, part.throttle
+    if "thrust" in recording.columns:
+        finer = recording.columns["thrust"]
+        values = finer.values * np.interp(finer.time_s, rows.time_s, lean)
+        between = (finer.time_s > time_s[0]) & (finer.time_s < time_s[-1]) & np.isfinite(values)
+        at_s, first = np.unique(np.append(time_s, finer.time_s[between]), return_index=True)
+        thrust = np.append(thrust, values[between])[first]
+    signals = {each.name: getattr(part, each.name) for each in fields(part)}
+    return FinerSegment(**signals | {"a_m_s2": np.append(changes[0], changes)}, motor_time_s=at_s, motor_values=thrust)
+
+
+def _manoeuvres(rows: Segment) -> Samples:
+    """Acceleration that the reference alone asks for, shape (n,): steps of the altitude count too."""
+    target, time_s = rows.v_d_m_s + rows.z_d_m, rows.time_s
+    return np.diff(target, prepend=target[0]) / np.diff(time_s, prepend=time_s[0] - 1.0) + rows.a_d_m_s2
+
+
+def _step_s(logged_s: float, given: Parameters) -> float:
+    """Interval of the estimates, s: as logged, or where not all were, as the estimator's parameters say, in whole
+    intervals of the IMU."""
+    return logged_s if 0.0 < logged_s <= _EVERY_POSITION_S else estimator_step_s(given)
+
+
+def _feed_forward(recording: Recording, time_s: Samples) -> tuple[Samples, Samples]:
+    """Climb rate and acceleration that the set-points give beside the altitude, up, shape (n,) each: 0 where they give
+    none, NaN where no set-point is near."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    given_v, given_a = (recording.columns[f"given_{each}"] for each in ("climb_rate_m_s", "acceleration_m_s2"))
+    at_s, v, a = given_v.time_s, given_v.values, given_a.values
+    rates = np.where(np.isfinite(v) & np.isfinite(a), a, 0.0)
+    if len(at_s) < 2:
+        return np.full(len(time_s), np.nan), np.full(len(time_s), np.nan)
+    v_d = CubicHermiteSpline(at_s, np.nan_to_num(v), rates)(np.clip(time_s, at_s[0], at_s[-1]))
+    a_d = np.interp(time_s, at_s, np.nan_to_num(a))
+    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
+    near = (time_s >= at_s[0]) & (time_s - at_s[after - 1] <= _SET_POINT_LASTS_S)
+    return np.where(near, v_d, np.nan), np.where(near, a_d, np.nan)
+
+
+def _require_columns(recording: Recording, refused: Refused) -> None:
+    """Require what an analysis needs, and that the vehicle flew on rotors at some time, if the log tells."""
+    if not recording.sources:
+        raise refused("file", "has no data: copy the whole log")
+    kinds = recording.columns.get("vehicle_type")
+    if kinds is not None and np.all(kinds.values >= _OTHER_KINDS):
+        raise refused(kinds.source, "is never that of a copter: fixed wing, or on the ground")
+    for each in _NEEDED:
+        source = SOURCES[each]
+        if source.message not in recording.sources:
+            raise refused(source.message, "is missing: set bit 0 of SDLOG_PROFILE, its default, and fly again")
+        if each not in recording.columns:
+            raise refused(str(source), "is missing: this release is not supported")

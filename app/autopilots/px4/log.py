@@ -1,0 +1,186 @@
+"""PX4's log (.ulg, "ULog") to a `Recording`: which topic and field means what."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.autopilots.recording import (
+    Column,
+    Event,
+    EventKind,
+    GainSets,
+    Recording,
+    Rows,
+    Setting,
+    Source,
+    Span,
+    columns_of,
+    own_names,
+    spans_of,
+)
+from app.core.control.px4_parameters import GAINS, LOOP_NAMES
+from app.core.records.trajectory import Samples
+from app.logs.base import Table, rows_of
+from app.logs.ulog import has_rows, read_ulog_tables
+
+POSITION, TARGET, SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
+TAKEOFF, STATUS = "takeoff_status", "vehicle_status"
+_LANDED, _LIMITS, _HOVER = "vehicle_land_detected", "vehicle_constraints", "hover_thrust_estimate"
+_COMMAND, _ANSWER = "vehicle_command", "vehicle_command_ack"
+
+
+def _state(topic: str, field: str) -> Source:
+    return Source(topic, field, holds_s=np.inf)
+
+
+SOURCES: Final[Mapping[str, Source]] = {
+    "altitude_m": Source(POSITION, "z", -1.0),
+    "altitude_is_valid": _state(POSITION, "z_valid"),
+    "climb_rate_m_s": Source(POSITION, "vz", -1.0),
+    "altitude_derivative_m_s": Source(POSITION, "z_deriv", -1.0),
+    "altitude_resets": _state(POSITION, "z_reset_counter"),
+    "climb_rate_resets": _state(POSITION, "vz_reset_counter"),
+    "reference_m": Source(TARGET, "z", -1.0),
+    "climb_rate_target_m_s": Source(TARGET, "vz", -1.0),
+    "acceleration_target_m_s2": Source(TARGET, "acceleration[2]", -1.0),
+    "thrust_target": Source(TARGET, "thrust[2]", -1.0),
+    "thrust_target_north": Source(TARGET, "thrust[0]"),
+    "thrust_target_east": Source(TARGET, "thrust[1]"),
+    "given_altitude_m": Source(SET_POINT, "position[2]", -1.0),
+    "given_climb_rate_m_s": Source(SET_POINT, "velocity[2]", -1.0),
+    "given_acceleration_m_s2": Source(SET_POINT, "acceleration[2]", -1.0),
+    "takeoff_state": _state(TAKEOFF, "takeoff_state"),
+    "mode": _state(STATUS, "nav_state"),
+    "arming_state": _state(STATUS, "arming_state"),
+    "vehicle_type": _state(STATUS, "vehicle_type"),
+    "is_landed": _state(_LANDED, "landed"),
+    "has_contact": _state(_LANDED, "ground_contact"),
+    "climb_limit_m_s": _state(_LIMITS, "speed_up"),
+    "descent_limit_m_s": _state(_LIMITS, "speed_down"),
+    "hover_thrust": Source(_HOVER, "hover_thrust"),
+    "hover_thrust_is_valid": Source(_HOVER, "valid"),
+    "thrust": Source("vehicle_thrust_setpoint", "xyz[2]", -1.0),
+    "battery_v": Source("battery_status", "voltage_v"),
+}
+"""The given values are the set-points, in force until the next one; `thrust` is that of the body, logged more often
+than its target."""
+VEHICLE: Final = "MAV_SYS_ID"
+GAIN_SETS: Final[GainSets] = (own_names(*GAINS),)
+
+_TAKE_OFF, _LAND = 22, 21
+_ANSWERED_WITHIN_S: Final = 2.0
+_TAKEOFF_MODE, _HOVER_MODE = 17, 4
+_COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
+"""Return, descend, land, precision landing: no takeoff begins in these modes."""
+_ARMED: Final = 2.0
+_BOUNCE_S: Final = 2.0
+"""Leaving the ground sooner than this after a touchdown is not a new takeoff."""
+_MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position", 3: "mission", 5: "return", 18: "land"}
+
+
+def read_px4(stream: BinaryIO) -> Recording:
+    """Decode a whole log. Raises TrajectoryError if it is not a readable ULog."""
+    wanted = {_COMMAND, _ANSWER, *(source.message for source in SOURCES.values())}
+    tables = read_ulog_tables(stream, topics=wanted, parameters={*LOOP_NAMES, VEHICLE})
+    columns = columns_of(tables.topics, SOURCES, clock="timestamp")
+    recording = Recording(
+        title="PX4's log (ULog)",
+        autopilot="px4",
+        clock="vehicle",
+        columns=columns,
+        from_ground=True,
+        sources=[topic for topic, table in tables.topics.items() if has_rows(table)],
+        gain_sets=GAIN_SETS,
+        settings=[Setting(*each) for each in tables.settings],
+        notes=tables.notes,
+    )
+    return replace(
+        recording,
+        events=[*_commands(tables.topics), *_changes(recording)],
+        in_air=_in_air(recording),
+        armed=_armed(recording),
+        remarks=list(_remarks(columns)),
+    )
+
+
+def _commands(topics: Mapping[str, Table]) -> Iterator[Event]:
+    """Commands to take off and to land that were not refused."""
+    answers = rows_of(topics.get(_ANSWER, {}), "timestamp", "command", "result")
+    refusals = [(time_s, command) for time_s, command, result in answers if result]
+    for time_s, command in rows_of(topics.get(_COMMAND, {}), "timestamp", "command"):
+        refused_at = [at for at, what in refusals if what == command and 0.0 <= at - time_s <= _ANSWERED_WITHIN_S]
+        if command == _TAKE_OFF and not refused_at:
+            yield Event(EventKind.TAKEOFF, time_s, "the command NAV_TAKEOFF")
+        elif command == _LAND and not refused_at:
+            yield Event(EventKind.COMMAND, time_s, "the command NAV_LAND")
+
+
+def _changes(recording: Recording) -> Iterator[Event]:
+    """Modes that begin and end a flight, and landings."""
+    if "mode" in recording.columns:
+        time_s, modes = recording.columns["mode"].time_s, recording.columns["mode"].values
+        takes_off = (modes == _TAKEOFF_MODE) & _may_be_armed(recording, time_s)
+        begins = takes_off & ~np.append(False, takes_off[:-1])
+        ends = (np.diff(modes, prepend=modes[0]) != 0.0) & ~np.isin(modes, (_TAKEOFF_MODE, _HOVER_MODE))
+        yield from (Event(EventKind.TAKEOFF, at_s, "the takeoff mode") for at_s in time_s[begins].tolist())
+        for at_s, mode in zip(time_s[ends].tolist(), modes[ends].tolist(), strict=True):
+            yield Event(EventKind.MODE, at_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
+    if "is_landed" in recording.columns:
+        landed = recording.columns["is_landed"]
+        down = (landed.values[1:] != 0.0) & (landed.values[:-1] == 0.0)
+        yield from (Event(EventKind.LANDING, at_s, "the landing") for at_s in landed.time_s[1:][down].tolist())
+
+
+def _may_be_armed(recording: Recording, time_s: Samples) -> Rows:
+    """Whether the motors were armed at these times, or it was not reported, shape (n,)."""
+    state = recording.at("arming_state", time_s)
+    return np.asarray((state == _ARMED) | np.isnan(state))
+
+
+def _in_air(recording: Recording) -> list[Span] | None:
+    """Intervals from each lift-off to the touchdown, from the land detector, with the motors armed if that is known.
+
+    A lift-off in a descending mode, or within two seconds of a touchdown (a bounce), is not counted. None without the
+    land detector.
+    """
+    columns = recording.columns
+    if "is_landed" not in columns:
+        return None
+    time_s = np.unique(
+        np.concatenate([columns[each].time_s for each in ("is_landed", "arming_state") if each in columns])
+    )
+    flying = (recording.at("is_landed", time_s) == 0.0) & _may_be_armed(recording, time_s)
+    spans = spans_of(zip(time_s.tolist(), flying.tolist(), strict=True))
+    modes = recording.at("mode", np.array([span.begin_s for span in spans]))
+    touched_s = [-np.inf, *(span.end_s for span in spans)]
+    return [
+        span
+        for span, before_s, mode in zip(spans, touched_s, modes.tolist(), strict=False)
+        if mode not in _COMING_DOWN and span.begin_s - before_s >= _BOUNCE_S
+    ]
+
+
+def _armed(recording: Recording) -> list[Span] | None:
+    """Intervals with the motors armed; None if the log does not report them."""
+    arming = recording.columns.get("arming_state")
+    if arming is None:
+        return None
+    return spans_of(zip(arming.time_s.tolist(), (arming.values == _ARMED).tolist(), strict=True))
+
+
+def _remarks(columns: Mapping[str, Column]) -> Iterator[str]:
+    """On missing topics, needed to tell a takeoff from a jump of the altitude, and on the method used instead."""
+    has_status = {"mode", "arming_state"} <= columns.keys()
+    if "is_landed" not in columns:
+        how = "while it was armed" if has_status else "armed or not"
+        yield (
+            f"no {_LANDED} in the log, so the takeoff is found from a rise of the altitude, {how}: check that "
+            "it is the right flight"
+        )
+    elif not has_status:
+        yield (
+            f"no {STATUS} in the log, so the takeoff is found from the land detector alone: check that it is "
+            "the right flight"
+        )

@@ -1,0 +1,295 @@
+"""Simulated PX4.
+
+Its altitude is controlled by the replica of PX4's vertical loop; see px4_control.py. OFFBOARD takes set points of
+position, velocity and acceleration, of which only the vertical parts act.
+"""
+
+import contextlib
+import math
+import struct
+from dataclasses import asdict
+from types import MappingProxyType
+from typing import ClassVar, Final
+
+from app.autopilots.dialects import COMMON
+from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
+from app.autopilots.px4.simulated_control import Px4Controller
+from app.autopilots.simulated.body import ACCEPTED, TEMPORARILY_REJECTED, Body, OutgoingMessage
+from app.autopilots.simulated.copter import Copter, copter_kind
+from app.autopilots.simulated.copter_control import Phase, SetPoint
+from app.autopilots.simulated.copter_parameters import (
+    BYTEWISE,
+    Behaviour,
+    FirmwareProfile,
+    FlightMode,
+    Kind,
+    Parameter,
+    Reaction,
+    real,
+)
+from app.autopilots.simulated.copter_telemetry import HOME_AMSL_M
+from app.core.control import px4_parameters as loop
+from app.core.errors import InputError
+
+_MANUAL: Final = 1 | 16 | 64
+_AUTO: Final = 1 | 4 | 8 | 16
+_TAKEOFF: Final = "AUTO.TAKEOFF"
+_OFFBOARD: Final = "OFFBOARD"
+_SLOWEST_STREAM_S: Final = 0.5
+"""Longest interval between set points of one stream."""
+_LARGEST_SET_POINT: Final = 1e6
+_STREAMED_FOR_S: Final = 1.0
+"""A stream counts once it has lasted for so long."""
+_NO_POSITION: Final = 1 << 24 | 13835193
+"""Event check_modes_local_pos of the autopilot."""
+_LOCAL_POSITION: Final = 17
+"""Component of the check, a bit of health_component_t."""
+_ALL_MODES: Final = 0xFFFFFFFF
+_ARMING_MODES: Final = _ALL_MODES & ~(1 << 18)
+"""All modes except landing."""
+_PROTOCOL: Final = 0x88
+_ERROR: Final = 0x33
+"""Internal and external log levels of an event."""
+_ARGUMENTS: Final = 40
+_SEQUENCE_NUMBERS: Final = 1 << 16
+_LINK_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.HOLD}
+_OFFBOARD_ACTIONS: Final = dict.fromkeys((0, 1, 2, 5), Reaction.HOLD)
+"""COM_OBL_RC_ACT: hold also in place of the modes of a pilot, which need a radio control that there is not."""
+_FENCE_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.WARN, 2: Reaction.HOLD}
+
+
+_LOOP_DEFAULTS: Final = asdict(loop.Parameters())
+
+
+def custom_mode(main: int, sub: int = 0) -> int:
+    """Return the mode as in HEARTBEAT."""
+    return main << 16 | sub << 24
+
+
+class Px4(Copter):
+    """PX4. Return-to-launch and termination only land, because the vehicle does not move horizontally."""
+
+    firmware: ClassVar[FirmwareProfile] = FirmwareProfile(
+        dialect=COMMON,
+        autopilot=12,
+        version=0x011000FF,
+        parameters=(
+            *(real(name, _LOOP_DEFAULTS[field]) for name, field in loop.FIRMWARE_NAMES.items()),
+            *(real(name, 0.0) for name in loop.UNSUPPORTED),
+            real("MPC_TKO_SPEED", 1.5),
+            real("MPC_Z_V_AUTO_UP", 3.0),
+            real("MPC_Z_V_AUTO_DN", 1.5),
+            real("MPC_ACC_UP_MAX", 4.0),
+            real("MPC_ACC_DOWN_MAX", 3.0),
+            real("MPC_JERK_AUTO", 4.0),
+            real("HTE_HT_ERR_INIT", 0.1),
+            real("HTE_HT_NOISE", 0.0036),
+            real("HTE_ACC_GATE", 3.0),
+            real("HTE_THR_RANGE", 0.2),
+            real("HTE_VZ_THR", 2.0),
+            real("COM_OF_LOSS_T", 1.0),
+            Parameter("COM_OBL_RC_ACT", Kind.INT32, 0),
+            real("MIS_TAKEOFF_ALT", 2.5),
+            Parameter("NAV_DLL_ACT", Kind.INT32, 0),
+            Parameter("COM_DL_LOSS_T", Kind.INT32, 10),
+            real("COM_DISARM_PRFLT", 10.0),
+            Parameter("GF_ACTION", Kind.INT32, 2),
+            real("GF_MAX_VER_DIST", 0.0),
+            real("GF_MAX_HOR_DIST", 0.0),
+            Parameter("MAV_SYS_ID", Kind.INT32, 1),
+            Parameter("SYS_AUTOSTART", Kind.INT32, 4001),
+        ),
+        coding=BYTEWISE,
+        periods_s=MappingProxyType(
+            {
+                "HEARTBEAT": 1.0,
+                "LOCAL_POSITION_NED": 0.02,
+                "GLOBAL_POSITION_INT": 0.02,
+                "ATTITUDE": 0.02,
+                "VFR_HUD": 0.05,
+                "SYS_STATUS": 0.2,
+                "GPS_RAW_INT": 0.2,
+                "EXTENDED_SYS_STATE": 0.2,
+                "BATTERY_STATUS": 0.5,
+                "SYSTEM_TIME": 1.0,
+                "HOME_POSITION": 2.0,
+            }
+        ),
+        streams=(),
+        modes=(
+            FlightMode("POSCTL", custom_mode(3), _MANUAL),
+            FlightMode("MANUAL", custom_mode(1), _MANUAL),
+            FlightMode("ALTCTL", custom_mode(2), _MANUAL),
+            FlightMode(_TAKEOFF, custom_mode(4, 2), _AUTO, Behaviour.TAKE_OFF),
+            FlightMode("AUTO.LOITER", custom_mode(4, 3), _AUTO),
+            FlightMode("AUTO.RTL", custom_mode(4, 5), _AUTO, Behaviour.LAND),
+            FlightMode(_OFFBOARD, custom_mode(6), _AUTO, Behaviour.FOLLOW),
+            FlightMode("AUTO.LAND", custom_mode(4, 6), _AUTO, Behaviour.LAND, may_arm=False),
+        ),
+        land="AUTO.LAND",
+        home="AUTO.RTL",
+        hold="AUTO.LOITER",
+        by_hand="POSCTL",
+        automatic="AUTO.LOITER",
+        refused=TEMPORARILY_REJECTED,
+        unready="Preflight Fail: ",
+        no_estimate="Arming denied: resolve system health failures first",
+        not_armable="Arming denied: Mode not suitable for takeoff",
+        not_landed="Disarming denied: not landed",
+        link_lost="GCS connection lost",
+        fence_breached="Geofence violated: maximum altitude exceeded",
+        ground_m=0.51,
+        lacks=frozenset({"NAV_CONTROLLER_OUTPUT"}),
+    )
+
+    controller: Px4Controller
+
+    def __init__(self, body: Body, *, system: int) -> None:
+        defaults = {parameter.name: parameter.default for parameter in self.firmware.parameters}
+        super().__init__(body, Px4Controller(body, defaults, ground_m=self.firmware.ground_m), system=system)
+        self._streamed_s = self._stream_began_s = -math.inf
+        self._chosen = self.mode
+        self._events = 0
+        self._reported_failing: bool | None = None
+
+    def tick(self) -> list[OutgoingMessage]:
+        """Advance by one tick. At its takeoff height it switches to hold. When it disarms it returns to the last mode
+        that was chosen and in which it may be armed: after targets, to OFFBOARD, where it does not arm without a
+        stream. If Land is commanded after that, it stays in the landing mode, and does not arm either."""
+        was_armed = self.armed
+        self._watch_stream()
+        messages = super().tick()
+        self.took_off |= self.controller.flies
+        if self._is_failing != self._reported_failing:
+            self._send_check_events()
+        if self.mode.name == _TAKEOFF and self.controller.phase is Phase.HOLDING:
+            self.mode = self.find_mode(self.firmware.hold)
+        self._chosen = self.mode if self.mode.may_arm else self._chosen
+        if was_armed and not self.armed:
+            self.mode = self._chosen
+        return messages
+
+    def prearm_failure(self) -> str | None:
+        """Return why it cannot be armed, including the mode."""
+        return self.arming_refusal()
+
+    def arming_refusal(self) -> str | None:
+        if self.mode.name == _OFFBOARD and not self._is_streamed_to:
+            return self.firmware.no_estimate
+        return super().arming_refusal()
+
+    def report_checks(self) -> None:
+        super().report_checks()
+        self._send_check_events()
+
+    @property
+    def _is_failing(self) -> bool:
+        """Whether it has no position estimate, which prevents arming in every mode."""
+        return Copter.prearm_failure(self) is not None
+
+    def _send_check_events(self) -> None:
+        """Send the results of its arming checks as events, in the order of the events interface."""
+        failing = self._reported_failing = self._is_failing
+        self._send_event(
+            ARMING_CHECK_SUMMARY,
+            *(0, 1 << _LOCAL_POSITION if failing else 0, 0),
+            *((0, 0) if failing else (_ARMING_MODES, _ARMING_MODES)),
+            layout="<BIIII",
+        )
+        if failing:
+            self._send_event(_NO_POSITION, _ALL_MODES, _LOCAL_POSITION, layout="<IB", levels=_ERROR)
+        self._send_event(HEALTH_SUMMARY, 0, 0, 0, 0, layout="<BIII")
+
+    def _send_event(self, number: int, *arguments: int, layout: str, levels: int = _PROTOCOL) -> None:
+        """Send an event as a broadcast."""
+        packed = struct.pack(layout, *arguments)
+        self._out.append(
+            OutgoingMessage(
+                "EVENT",
+                {
+                    "id": number,
+                    "event_time_boot_ms": int(self.boot_s * 1000.0),
+                    "sequence": self._events % _SEQUENCE_NUMBERS,
+                    "destination_component": 0,
+                    "destination_system": 0,
+                    "log_levels": levels,
+                    "arguments": packed.ljust(_ARGUMENTS, b"\0"),
+                },
+            )
+        )
+        self._events += 1
+
+    def tune(self) -> None:
+        """Pass the parameters to the loop. With values for which it is not defined, it keeps those it had."""
+        with contextlib.suppress(InputError):
+            self.controller.tune(self.parameters.values())
+
+    def requested_mode(self, main: int, sub: int) -> FlightMode | None:
+        wanted = custom_mode(max(main, 0), max(sub, 0))
+        return next((mode for mode in self.firmware.modes if mode.custom_mode == wanted), None)
+
+    def mode_refusal(self, mode: FlightMode) -> str | None:
+        """Refuse OFFBOARD without a stream of set points."""
+        is_refused = mode.name == _OFFBOARD and not self._is_streamed_to
+        return "Switching to Offboard is currently not available" if is_refused else None
+
+    def follow(self, target: SetPoint, type_mask: int) -> None:  # noqa: ARG002  NaN tells what is not given
+        """Store a set point, in which the altitude, its rate or the acceleration is given."""
+        if not target.given or max(map(abs, target.given)) > _LARGEST_SET_POINT:
+            return
+        if self.boot_s - self._streamed_s > _SLOWEST_STREAM_S:
+            self._stream_began_s = self.boot_s
+        self._streamed_s = self.boot_s
+        self.controller.stream(target)
+
+    def follow_stream(self) -> None:
+        self.controller.begin_following()
+
+    @property
+    def _is_streamed_to(self) -> bool:
+        is_fresh = self.boot_s - self._streamed_s <= self.parameters["COM_OF_LOSS_T"]
+        return is_fresh and self.boot_s - self._stream_began_s >= _STREAMED_FOR_S
+
+    def _watch_stream(self) -> None:
+        """React to the loss of the set points in OFFBOARD."""
+        if self.mode.name != _OFFBOARD or not self.controller.flies:
+            return
+        if self.boot_s - self._streamed_s > self.parameters["COM_OF_LOSS_T"]:
+            action = _OFFBOARD_ACTIONS.get(int(self.parameters["COM_OBL_RC_ACT"]), Reaction.LAND)
+            self.react(action, "No offboard signal")
+
+    def take_off(self, param7: float) -> int:
+        """Take off to `param7` metres above sea level, or, if it is not finite, to MIS_TAKEOFF_ALT above the place of
+        takeoff. A disarmed vehicle takes off when it is armed."""
+        if self.mode.name == _OFFBOARD:
+            self.controller.hold()
+        self.mode = self.find_mode(_TAKEOFF)
+        height_m = param7 - HOME_AMSL_M if math.isfinite(param7) else self.parameters["MIS_TAKEOFF_ALT"]
+        if height_m <= 0.0:
+            self.send_text("Already higher than takeoff altitude")
+        elif self.armed and not self.controller.flies:
+            self.climb(height_m)
+        return ACCEPTED
+
+    def link_loss(self) -> tuple[float, Reaction]:
+        return self.parameters["COM_DL_LOSS_T"], _LINK_ACTIONS.get(int(self.parameters["NAV_DLL_ACT"]), Reaction.LAND)
+
+    def fence(self) -> tuple[float, Reaction]:
+        """Return limit and reaction of the altitude fence; a distance of 0 disables it."""
+        limit_m = self.parameters["GF_MAX_VER_DIST"]
+        if limit_m <= 0.0:
+            return math.inf, Reaction.NONE
+        return limit_m, _FENCE_ACTIONS.get(int(self.parameters["GF_ACTION"]), Reaction.LAND)
+
+    def idle_limit_s(self) -> float:
+        return self.parameters["COM_DISARM_PRFLT"]
+
+
+_FAILSAFES: Final = {
+    "NAV_DLL_ACT": 3.0,  # land
+    "GF_ACTION": 5.0,  # land
+    "GF_MAX_VER_DIST": 10.0,
+    "COM_OBL_RC_ACT": 4.0,  # land without set points
+}
+
+KINDS: Final = (copter_kind("px4", "PX4", lambda body, system: Px4(body, system=system), _FAILSAFES),)

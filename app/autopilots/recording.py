@@ -1,0 +1,289 @@
+"""What any flight left behind, as one type: named columns, events, parameters, and notes of what was lost or damaged.
+
+A decoder of each format makes a `Recording` of what a firmware logged; takeoffs, the segments of a flight and the check
+of the replica are derived from it. A column's name ends in its unit (1, a share, if in none); altitudes, their rates
+and thrusts are positive up.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.errors import InputError, Problem, TrajectoryError
+from app.core.records.trajectory import Samples
+from app.logs.base import Table, numbers
+
+LONGEST_INTERVAL_S: Final = 0.25
+"""Between rows that are further apart, nothing is known."""
+
+Rows = NDArray[np.bool_]
+Parameters = Mapping[str, float]
+Refused = Callable[[str, str], InputError]
+"""The error that a field and a reason make."""
+
+
+class EventKind(StrEnum):
+    """What happened: the vehicle starting anew, its clock going on some time later; a command or mode that begins a
+    takeoff, another command or mode; leaving the ground, reaching it, the motors being switched off; a parameter
+    becoming another, the end of what is recorded."""
+
+    BOOT = "boot"
+    TAKEOFF = "takeoff"
+    COMMAND = "command"
+    MODE = "mode"
+    LIFT_OFF = "lift-off"
+    LANDING = "landing"
+    MOTORS_OFF = "motors off"
+    PARAMETER = "parameter"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """An event in seconds of the recording, and its description: "the block Takeoff"."""
+
+    kind: EventKind
+    time_s: float
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """An interval in which a condition held, in seconds; `end_s` is infinite if the recording ends first."""
+
+    begin_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter that the vehicle used from this time on, −∞ if from before the recording; NaN if it is unknown from
+    then on. `held_before`: it is reported for the first time, and nobody had written it before in the recording."""
+
+    time_s: float
+    name: str
+    value: float
+    held_before: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedGain:
+    """A gain of an experiment by its name in the log, with the `factor` from the gain to the value in the log."""
+
+    name: str
+    gain: str
+    factor: float = 1.0
+
+    def value(self, logged: float) -> float:
+        """The gain for a value in the log, to the seven digits of single precision."""
+        return logged if self.factor == 1.0 else float(f"{logged / self.factor:.7g}")
+
+
+GainSets = Sequence[Sequence[LoggedGain]]
+
+
+def own_names(*names: str) -> Sequence[LoggedGain]:
+    """Gains that have the same names and units in the log."""
+    return tuple(LoggedGain(name, name) for name in names)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where a column comes from: a field of a message, and the factor to the column's unit. A state `holds_s` long."""
+
+    message: str
+    field: str
+    factor: float = 1.0
+    holds_s: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.message}.{self.field}"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One quantity as its source reported it, shape (n,) each, n ≥ 1; `time_s` increases.
+
+    A quantity changes steadily between two reports, or keeps the last one for `holds_s`.
+    """
+
+    time_s: Samples
+    values: Samples
+    source: str
+    holds_s: float | None = None
+
+    @property
+    def interval_s(self) -> float:
+        """Median interval of the reports."""
+        return float(np.median(np.diff(self.time_s)))
+
+    def at(self, time_s: Samples) -> Samples:
+        """The quantity at other times, shape (m,)."""
+        if time_s is self.time_s:
+            return self.values
+        if self.holds_s is None:
+            return np.interp(time_s, self.time_s, self.values)
+        return held(self.time_s, self.values, time_s, longest_s=self.holds_s)
+
+    def beside(self, time_s: Samples) -> Samples:
+        """The quantity between two reports that are near to each other, shape (m,); NaN elsewhere."""
+        return beside(self.time_s, self.values, time_s)
+
+
+def columns_of(
+    tables: Mapping[str, Table], sources: Mapping[str, Source], *, clock: str, ticks_per_s: float = 1e6
+) -> dict[str, Column]:
+    """The columns that were logged, in order of time, those of a message at the same `time_s`; `clock` is the field
+    with the time.
+
+    Reports older than one before them are left out. Of several at the same time the first counts, or for a state the
+    last.
+    """
+    columns: dict[str, Column] = {}
+    orders: dict[tuple[str, bool], tuple[Samples, NDArray[np.int64]]] = {}
+    for name, source in sources.items():
+        table = tables.get(source.message, {})
+        if {clock, source.field} <= table.keys() and len(table[clock]):
+            is_state = source.holds_s is not None
+            if (source.message, is_state) not in orders:
+                at_s = numbers(table[clock]) / ticks_per_s
+                rows = _latest(at_s) if is_state else increasing(at_s)
+                orders[source.message, is_state] = at_s[rows], rows
+            time_s, rows = orders[source.message, is_state]
+            values = source.factor * numbers(table[source.field])[rows]
+            columns[name] = Column(time_s, values, str(source), source.holds_s)
+    return columns
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterHistory:
+    """The values in force from each time on, s, increasing."""
+
+    times_s: Sequence[float]
+    values: Sequence[Parameters]
+
+    @classmethod
+    def of(cls, logged: Iterable[tuple[float, str, float]]) -> Self:
+        """The history of logged values (time, name, value), in order of time."""
+        times_s, history = [], []
+        values: Parameters = {}
+        for time_s, name, value in logged:
+            if np.isfinite(value) and values.get(name) != value:
+                values = {**values, name: value}
+                times_s.append(time_s)
+                history.append(values)
+        return cls(times_s, history)
+
+    def at(self, time_s: float) -> Parameters:
+        """The values at a time."""
+        place = bisect_right(self.times_s, time_s) - 1
+        return self.values[place] if place >= 0 else {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """A recording of one vehicle, `system` in MAVLink, under an `autopilot`: ardupilot, px4, paparazzi.
+
+    `firmware` and `frame` are named if they are not those of a copter with several rotors. `sources` are the messages
+    that it has, of which some are columns. `from_ground`: its altitude is to be measured from where the vehicle stood.
+    `gain_sets` are the gains of its autopilot by the names of each release; the
+    first set whose names are all in `settings` applies. `in_air` are the intervals from lift-off to touchdown, `armed`
+    those with the motors armed, both as reported by the autopilot and in order; None if it does not report them.
+    `blocks` are the intervals in blocks of a flight plan, each from the command that activated it. `notes` say what was
+    lost or damaged, and `remarks` how takeoffs are found for want of a message.
+    """
+
+    title: str
+    autopilot: str
+    clock: str
+    system: int = 1
+    firmware: str = ""
+    frame: str = ""
+    columns: Mapping[str, Column]
+    from_ground: bool
+    sources: Collection[str] = ()
+    gain_sets: GainSets = ()
+    settings: Sequence[Setting] = ()
+    has_all_parameters: bool = True
+    events: Sequence[Event] = ()
+    in_air: Sequence[Span] | None = None
+    armed: Sequence[Span] | None = None
+    blocks: Sequence[Span] = ()
+    notes: Sequence[str] = ()
+    remarks: Sequence[str] = ()
+
+    def at(self, name: str, time_s: Samples) -> Samples:
+        """A column at these times, shape (n,); NaN if there is none."""
+        return self.columns[name].at(time_s) if name in self.columns else np.full(len(time_s), np.nan)
+
+    def events_of(self, *kinds: EventKind) -> list[Event]:
+        return [event for event in self.events if event.kind in kinds]
+
+    def history(self, names: Collection[str]) -> ParameterHistory:
+        """Of these parameters."""
+        return ParameterHistory.of((each.time_s, each.name, each.value) for each in self.settings if each.name in names)
+
+
+def refusal(happened: str, hint: str, notes: Sequence[str] = (), error: type[InputError] = TrajectoryError) -> Refused:
+    """Errors of a log in which this happened, with `notes` after each reason."""
+    return lambda field, reason: error(happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),))
+
+
+def names_in(sets: GainSets) -> frozenset[str]:
+    """All names in these sets, as in the log."""
+    return frozenset(gain.name for gains in sets for gain in gains)
+
+
+def restarts(boots: int) -> list[str]:
+    """The note on how often the vehicle started anew, if it did."""
+    return [f"the vehicle restarted and reset its clock ({boots}×)"] if boots else []
+
+
+def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:
+    """Intervals in which a condition held, from timed reports of it."""
+    spans: list[Span] = []
+    since_s: float | None = None
+    for time_s, holds in states:
+        if holds and since_s is None:
+            since_s = time_s
+        elif not holds and since_s is not None:
+            spans.append(Span(since_s, time_s))
+            since_s = None
+    return spans if since_s is None else [*spans, Span(since_s, np.inf)]
+
+
+def increasing(at_s: Samples) -> NDArray[np.int64]:
+    """Rows, shape (k,), each later than all before it."""
+    latest = np.fmax.accumulate(at_s)
+    return np.flatnonzero(np.append(~np.isnan(at_s[:1]), latest[1:] > latest[:-1]))
+
+
+def _latest(at_s: Samples) -> NDArray[np.int64]:
+    """The last row, shape (k,), of each time that is later than all before it."""
+    kept = np.flatnonzero(at_s >= np.fmax.accumulate(at_s))
+    return np.append(kept[:-1][at_s[kept[1:]] > at_s[kept[:-1]]], kept[-1:])
+
+
+def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:
+    """Values known at `at_s`, shape (k,) each, which increases, at other times, shape (n,), linear between its rows;
+    NaN outside them, and between two that are too far apart."""
+    if len(at_s) < 2:
+        return np.full(len(time_s), np.nan)
+    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
+    found = np.interp(time_s, at_s, values, left=np.nan, right=np.nan)
+    found[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
+    return found
+
+
+def held(at_s: Samples, values: Samples, time_s: Samples, *, longest_s: float = np.inf) -> Samples:
+    """The value last reported at each time, shape (n,), of those at `at_s`, shape (k,), which increases; NaN before the
+    first, and where the last is older than `longest_s`."""
+    last = np.searchsorted(at_s, time_s, side="right") - 1
+    if not len(at_s):
+        return np.full(len(time_s), np.nan)
+    return np.where((last >= 0) & (time_s - at_s[last] <= longest_s), values[last], np.nan)

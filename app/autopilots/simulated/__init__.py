@@ -1,0 +1,1 @@
+"""What the simulated counterparts of autopilots share: the body that they fly, and a copter of MAVLink 2."""

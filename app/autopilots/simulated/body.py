@@ -1,0 +1,237 @@
+"""The body of a simulated drone, which persists between flights and falls if its motors stop in the air, and the
+interface and kinds of the autopilots that fly it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple, Protocol, Self
+
+from app.autopilots.dialects import Dialect, FieldValue
+from app.core.control.paparazzi import RATE_HZ, THROTTLE
+
+TICK_STEPS: Final = 2
+"""Steps of the simulation between two updates of the autopilot's radio, timers and flight plan."""
+TICK_S: Final = TICK_STEPS / RATE_HZ
+FULL_BATTERY_V: Final = 11.1
+_STANDS_BELOW_M: Final = 0.03
+_STANDS_BELOW_M_S: Final = 0.1
+
+_FULL_COMMAND: Final = 9600
+
+
+class VerticalCommand(NamedTuple):
+    """A command of the body's vertical loop, in its integers."""
+
+    mode: int
+    target: int
+    kp: int = 0
+    ki: int = 0
+    kd: int = 0
+
+
+MOTORS_OFF: Final = VerticalCommand(THROTTLE, 0)
+
+
+def throttle_command(share: float) -> VerticalCommand:
+    """Return a command of thrust as a share of full, for autopilots with their own loop."""
+    return VerticalCommand(THROTTLE, round(min(max(share, 0.0), 1.0) * _FULL_COMMAND))
+
+
+class Flight(Protocol):
+    """A simulation of the body from its first thrust on."""
+
+    def advance(self, steps: int, command: VerticalCommand) -> tuple[float, float, float, float]:
+        """Return its altitude, m, climb rate, m/s, thrust and battery voltage after `steps` steps of 1/512 s."""
+        ...
+
+    def forget_error_sum(self) -> None: ...
+
+
+Launch = Callable[[int], Flight]
+"""Creates a flight, standing on the ground, from its seed."""
+
+
+class Body:
+    """The vehicle between power-on and power-off. Altitude is above the ground at its place.
+
+    A flight begins with the first thrust and ends when the motors are off on the ground; the seed is incremented for
+    every flight. Between flights nothing is computed.
+    """
+
+    def __init__(self, launch: Launch, *, seed: int) -> None:
+        self._launch = launch
+        self._seed = seed
+        self._flight: Flight | None = None
+        self.altitude_m = 0.0
+        self.climb_rate_m_s = 0.0
+        self.thrust = 0.0
+        self.battery_v = FULL_BATTERY_V
+        self.north_m = 0.0
+        """Position relative to the place where it was switched on."""
+        self.steered_m_s = self.wind_m_s = 0.0
+        """Speeds north, by its autopilot and by the wind, while it is off the ground."""
+        self.motors_dead = False
+        """Fault: the motors do not turn."""
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether it is on the ground with its motors off."""
+        return self._flight is None
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is on the ground, by height and speed."""
+        return abs(self.altitude_m) < _STANDS_BELOW_M and abs(self.climb_rate_m_s) < _STANDS_BELOW_M_S
+
+    @property
+    def north_m_s(self) -> float:
+        return 0.0 if self.is_resting or self.stands else self.steered_m_s + self.wind_m_s
+
+    def advance(self, steps: int, command: VerticalCommand) -> None:
+        """Advance by `steps` steps of 1/512 s under `command`. Raises GainlineError if the simulation diverged."""
+        if self.motors_dead:
+            command = MOTORS_OFF
+        wants_to_rest = command.mode == THROTTLE and command.target == 0
+        if wants_to_rest and (self._flight is None or self.stands):
+            self._rest()
+            return
+        if self._flight is None:
+            self._flight = self._launch(self._seed)
+            self._seed += 1
+        self.altitude_m, self.climb_rate_m_s, self.thrust, self.battery_v = self._flight.advance(steps, command)
+        self.north_m += self.north_m_s * steps / RATE_HZ
+
+    def forget_error_sum(self) -> None:
+        """Empty the vertical loop's integrator."""
+        if self._flight is not None:
+            self._flight.forget_error_sum()
+
+    def _rest(self) -> None:
+        self._flight = None
+        self.altitude_m = self.climb_rate_m_s = self.thrust = 0.0
+        self.battery_v = FULL_BATTERY_V
+
+
+Fields = Mapping[str, FieldValue]
+
+ARMED: Final = 128
+"""Bit of HEARTBEAT.base_mode."""
+
+# MAV_RESULT
+ACCEPTED: Final = 0
+TEMPORARILY_REJECTED: Final = 1
+UNSUPPORTED: Final = 3
+FAILED: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class OutgoingMessage:
+    """An outgoing message, not yet packed. `counter` names its sequence counter: Paparazzi has one for each of its
+    source files. `system` is the sender's id if it is not the vehicle's own."""
+
+    kind: str
+    fields: Fields
+    counter: str = ""
+    system: int | None = None
+
+
+class SimulatedAutopilot(Protocol):
+    """A simulated autopilot: it flies its body, receives bytes and returns messages to send. Its time is counted in
+    ticks since it was switched on."""
+
+    dialect: Dialect
+    system: int
+    component: int
+    refuses_arming: bool
+    """Fault: arming is refused as this autopilot does it."""
+    ignores_parameters: bool
+    """Fault: PARAM_SET changes nothing and has no reply."""
+    took_off: bool
+    """Whether a takeoff has been commanded."""
+
+    @property
+    def armed(self) -> bool: ...
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether it is in the mode in which a pilot flies it."""
+        ...
+
+    def held(self, parameter: str) -> float:
+        """Return the true value of a parameter, whatever was sent. Raises KeyError for an unknown name."""
+        ...
+
+    def receive(self, data: bytes) -> None:
+        """Process bytes received by the radio."""
+        ...
+
+    def take_over(self) -> None:
+        """Switch to the pilot's mode, in which a pilot holds it in place."""
+        ...
+
+    def hand_back(self) -> None:
+        """Switch back from the pilot's mode to the automatic one."""
+        ...
+
+    def kill(self) -> None:
+        """Stop the motors, at any height, as another ground station commands."""
+        ...
+
+    def fly_home(self) -> None:
+        """Enter the mode in which it flies home by itself."""
+        ...
+
+    def restore_persistent(self, before: Self) -> None:
+        """Copy what survives a reboot from the autopilot before it."""
+        ...
+
+    def tick(self) -> list[OutgoingMessage]:
+        """Advance by one tick of TICK_S: process received messages, fly the body, and return the messages to send."""
+        ...
+
+
+@dataclass(slots=True)
+class Timetable:
+    """Schedule of telemetry at fixed periods, rounded down to whole ticks."""
+
+    ticks: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def from_periods(cls, periods_s: Mapping[str, float]) -> "Timetable":
+        table = cls()
+        for kind, period_s in periods_s.items():
+            table.set(kind, period_s)
+        return table
+
+    def set(self, kind: str, period_s: float) -> None:
+        """Send `kind` every `period_s` seconds from now on; never if 0 or less."""
+        if period_s > 0.0:
+            self.ticks[kind] = whole_ticks(period_s)
+        else:
+            self.ticks.pop(kind, None)
+
+    def due(self, tick: int) -> list[str]:
+        return [kind for kind, period in self.ticks.items() if tick % period == 0]
+
+
+def whole_ticks(seconds: float) -> int:
+    """Return the duration in whole ticks, at least one."""
+    return max(int(seconds / TICK_S), 1)
+
+
+Make = Callable[[Body, int], SimulatedAutopilot]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedKind:
+    """A simulated autopilot as it is chosen; `make(body, system)` creates one with default parameters, `set_up` with
+    the failsafes enabled that are disabled by default, as before a first flight."""
+
+    name: str
+    title: str
+    system: int
+    """Default system id."""
+    link: str
+    """Default address of its link."""
+    make: Make
+    set_up: Make

@@ -1,0 +1,311 @@
+"""Telemetry logs (.tlog) to a `Recording`: what the vehicle reports, and what ground stations ask of it.
+
+Such a log has both directions of a connection, often of several vehicles, components and ground stations; messages may
+be lost, late or repeated, and the vehicle may restart. Time is the vehicle's own clock: messages without one are dated
+by the last message that has one. A takeoff begins with the ground station's command (a block with such a name, or else
+the one in which it lifted off; NAV_TAKEOFF, the takeoff mode); parameters are those that the vehicle replies with.
+"""
+
+import struct
+from array import array
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.autopilots.recording import (
+    LONGEST_INTERVAL_S,
+    Event,
+    EventKind,
+    Recording,
+    Setting,
+    Source,
+    Span,
+    columns_of,
+    names_in,
+    restarts,
+    spans_of,
+)
+from app.autopilots.tlog_vehicle import LoggedVehicle, find_vehicle
+from app.core.records.trajectory import THROTTLE_HOLDS_S
+from app.logs.base import Table, contents
+from app.logs.tlog import Message, messages
+
+SOURCES: Final[Mapping[str, Source]] = {
+    "altitude_m": Source("LOCAL_POSITION_NED", "z", -1.0),
+    "climb_rate_m_s": Source("LOCAL_POSITION_NED", "vz", -1.0),
+    "demanded_throttle": Source("ATTITUDE_TARGET", "thrust"),
+    "lean": Source("ATTITUDE_TARGET", "lean"),
+    "target_altitude_m": Source("POSITION_TARGET_LOCAL_NED", "z", -1.0, holds_s=LONGEST_INTERVAL_S),
+    "reference_error_m": Source("NAV_CONTROLLER_OUTPUT", "alt_error"),
+    "is_armed": Source("HEARTBEAT", "armed", holds_s=np.inf),
+    "mode": Source("HEARTBEAT", "custom_mode", holds_s=np.inf),
+    "battery_v": Source("SYS_STATUS", "voltage_battery"),
+    "throttle": Source("VFR_HUD", "throttle", holds_s=THROTTLE_HOLDS_S),
+}
+"""`lean` is the cosine of the demanded lean, `reference_error_m` how far the vehicle's own reference is above it; the
+target is NaN where the vehicle flies to none, or was given a speed or an acceleration beside it."""
+_TIME: Final = "time_s"
+_FROM_ANY: Final = frozenset({"PARAM_SET", "SET_POSITION_TARGET_LOCAL_NED"})
+"""Requests that count whoever sends them; others only from another system."""
+_BACK_S: Final = 20.0
+"""If the clock goes back by less than this, and not to a time since its last message, the message was late."""
+_SHORTEST_BOOT_S: Final = 1.0
+_ARMED: Final = 128
+_ACCEPTED: Final = (0, 5)
+_MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
+_COMMANDS: Final = MappingProxyType(
+    {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}
+)
+_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
+_IGNORES_Z: Final = 4
+_IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
+_IGNORES_ATTITUDE: Final = 128
+_INTEGERS: Final = range(1, 9)
+
+
+def read_tlog(stream: BinaryIO) -> Recording:
+    """Decode the messages of the vehicle that reports its position most often. Raises TrajectoryError if there is no
+    heartbeat of a known autopilot."""
+    data = contents(stream)
+    decoder = _Decoder(find_vehicle(data))
+    for message in messages(data, decoder.vehicle.autopilot.dialect, {*decoder.reports, *decoder.requests}):
+        decoder.take(message)
+    return decoder.recording()
+
+
+@dataclass(slots=True)
+class _Clock:
+    """Seconds since the vehicle's first boot in the log; a restart goes on in the ground's time."""
+
+    now_s: float = -np.inf
+    restarts: list[Event] = field(default_factory=list)
+    _ahead_s: float = 0.0
+    _stamp_s: float = 0.0
+
+    def at(self, boot_ms: float, stamp_s: float) -> float:
+        time_s, elapsed_s = boot_ms / 1000 + self._ahead_s, stamp_s - self._stamp_s
+        has_just_booted = boot_ms / 1000 <= elapsed_s + _SHORTEST_BOOT_S
+        if time_s < self.now_s - (_SHORTEST_BOOT_S if has_just_booted else _BACK_S):
+            self._ahead_s += self.now_s + max(elapsed_s, _SHORTEST_BOOT_S) - time_s
+            time_s = boot_ms / 1000 + self._ahead_s
+            self.restarts.append(Event(EventKind.BOOT, time_s, "the vehicle restarting"))
+        self.now_s, self._stamp_s = max(self.now_s, time_s), stamp_s
+        return time_s
+
+
+def _numbers() -> "array[float]":
+    return array("d")
+
+
+@dataclass(slots=True)
+class _Decoder:
+    """Messages of ground stations and the vehicle, in order of receipt."""
+
+    vehicle: LoggedVehicle
+    reports: Mapping[str, Callable[[Message], None]] = field(init=False)
+    requests: Mapping[str, Callable[[Message], None]] = field(init=False)
+    _clock: _Clock = field(default_factory=_Clock)
+    _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(_numbers))
+    _blocks: dict[int, str] = field(default_factory=dict)
+    _activated: list[tuple[float, int]] = field(default_factory=list)
+    _entered: list[tuple[float, int]] = field(default_factory=list)
+    _settings: list[Setting] = field(default_factory=list)
+    _known: set[str] = field(default_factory=set)
+    _written: set[str] = field(default_factory=set)
+    _parameters: int = 0
+    _asked: dict[str, float] = field(default_factory=dict)
+    _sent: dict[int, Event] = field(default_factory=dict)
+    _events: list[Event] = field(default_factory=list)
+    _arming: list[tuple[float, bool]] = field(default_factory=list)
+    _heard_s: float = -np.inf
+    _mode: int | None = None
+    _is_fed: bool = False
+    """Whether the last position target for it has more than a position, which it does not report."""
+
+    def __post_init__(self) -> None:
+        self.reports = {
+            "HEARTBEAT": self._heartbeat,
+            "LOCAL_POSITION_NED": self._position,
+            "ATTITUDE_TARGET": self._attitude_target,
+            "POSITION_TARGET_LOCAL_NED": self._position_target,
+            "NAV_CONTROLLER_OUTPUT": self._reference_error,
+            "SYS_STATUS": self._battery,
+            "VFR_HUD": self._throttle,
+            "PARAM_VALUE": self._parameter,
+            "COMMAND_ACK": self._answer,
+            "SCRIPT_ITEM": self._block,
+            "SCRIPT_CURRENT": self._block_entered,
+        }
+        self.requests = {
+            "PARAM_SET": self._parameter_asked,
+            "SET_POSITION_TARGET_LOCAL_NED": self._position_asked,
+            "SET_MODE": self._mode_asked,
+            "COMMAND_INT": self._command,
+            "COMMAND_LONG": self._command,
+            "SCRIPT_ITEM": self._block_asked,
+        }
+
+    def take(self, message: Message) -> None:
+        handlers: Mapping[str, Callable[[Message], None]] = {}
+        if (message.system, message.component) == (self.vehicle.system, self.vehicle.component):
+            handlers = self.reports
+        elif message.system != self.vehicle.system or message.name in _FROM_ANY:
+            handlers = self.requests
+        if message.name in handlers:
+            handlers[message.name](message)
+
+    def recording(self) -> Recording:
+        """What was read so far."""
+        autopilot = self.vehicle.autopilot
+        self._events.extend(self._sent.values())  # a command without an answer counts as accepted
+        for time_s, number in self._activated:
+            name = self._blocks.get(number, "")
+            takes_off = "takeoff" in name.casefold().replace(" ", "").replace("_", "")
+            kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
+            self._events.append(Event(kind, time_s, f"the block {name}" if name else f"block {number}"))
+        tables = {name: _table(name, values) for name, values in self._reports.items()}
+        return Recording(
+            title=f"MAVLink log of {autopilot.title}",
+            autopilot=autopilot.name,
+            clock="vehicle",
+            system=self.vehicle.system,
+            frame=self.vehicle.other_frame,
+            columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
+            from_ground=autopilot.from_ground,
+            sources=list(tables),
+            gain_sets=autopilot.gain_sets,
+            settings=self._settings,
+            has_all_parameters=0 < self._parameters <= len(self._known),
+            events=[*self._events, *self._clock.restarts],
+            armed=spans_of(self._arming) or None,
+            blocks=list(self._commanded_blocks()),
+            notes=[*restarts(len(self._clock.restarts)), *self._unconfirmed()],
+        )
+
+    def _unconfirmed(self) -> Iterator[str]:
+        for name, value in self._asked.items():
+            yield f"{name} was set to {value:g}, but the vehicle never confirmed it"
+
+    def _report(self, message: Message, *values: float) -> None:
+        """Take a report, dated by its own time, or else by the last one."""
+        has_time = "time_boot_ms" in message.fields
+        time_s = self._clock.at(message["time_boot_ms"], message.stamp_s) if has_time else self._clock.now_s
+        self._reports[message.name].extend((time_s, *values))
+
+    def _heartbeat(self, message: Message) -> None:
+        is_armed, mode, now_s = bool(int(message["base_mode"]) & _ARMED), int(message["custom_mode"]), self._clock.now_s
+        was_armed = bool(self._arming) and self._arming[-1][1]
+        if was_armed and not is_armed:
+            self._events.append(Event(EventKind.MOTORS_OFF, now_s, "motors off"))
+        if was_armed and self._mode != mode:
+            self._mode_changed(mode)
+        self._arming.append((self._heard_s if is_armed else now_s, is_armed))  # it armed since the heartbeat before
+        self._mode, self._heard_s = mode, now_s
+        self._report(message, float(is_armed), float(mode))
+
+    def _mode_changed(self, mode: int) -> None:
+        main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
+        if not self.vehicle.autopilot.has_takeoff_mode or main != 4 or sub not in (_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE):
+            self._events.append(Event(EventKind.MODE, self._clock.now_s, f"mode {sub or mode}"))
+        elif sub == _PX4_TAKEOFF_MODE:
+            self._events.append(Event(EventKind.TAKEOFF, self._clock.now_s, "takeoff mode"))
+
+    def _position(self, message: Message) -> None:
+        self._report(message, message["z"], message["vz"])
+
+    def _attitude_target(self, message: Message) -> None:
+        x, y, thrust = message["q[1]"], message["q[2]"], message["thrust"]
+        lean = 1.0 if int(message["type_mask"]) & _IGNORES_ATTITUDE else 1.0 - 2.0 * (x * x + y * y)
+        self._report(message, thrust if 0.0 <= thrust <= 1.0 else np.nan, lean)
+
+    def _position_target(self, message: Message) -> None:
+        is_unknown = self._is_fed or int(message["type_mask"]) & _IGNORES_Z
+        self._report(message, np.nan if is_unknown else message["z"])
+
+    def _reference_error(self, message: Message) -> None:
+        self._report(message, message["alt_error"])
+
+    def _battery(self, message: Message) -> None:
+        if 0 < message["voltage_battery"] < 0xFFFF and np.isfinite(self._clock.now_s):
+            self._report(message, message["voltage_battery"] / 1000)
+
+    def _throttle(self, message: Message) -> None:
+        if 0 <= message["throttle"] <= 100 and np.isfinite(self._clock.now_s):
+            self._report(message, message["throttle"] / 100)
+
+    def _parameter(self, message: Message) -> None:
+        bytewise = self.vehicle.autopilot.sends_integers_bytewise and int(message["param_type"]) in _INTEGERS
+        value = float(struct.unpack("<i", message.payload[:4])[0]) if bytewise else message["param_value"]
+        name = self._name(message)
+        if name in ("kil_thr", "aut_kil_thr") and value:
+            self._events.append(Event(EventKind.MOTORS_OFF, self._clock.now_s, "motors off"))
+        is_first = name not in self._known and name not in self._written
+        self._known.add(name)
+        self._parameters = int(message["param_count"])
+        if np.isfinite(value):
+            self._settings.append(Setting(self._clock.now_s, name, value, held_before=is_first))
+            if self._asked.get(name) == value:
+                del self._asked[name]
+
+    def _name(self, message: Message) -> str:
+        """The parameter, by the name that it has in the gain sets if it is a gain."""
+        name = message.text("param_id")
+        return (self.vehicle.autopilot.parameters or {}).get(name, name)
+
+    def _parameter_asked(self, message: Message) -> None:
+        name, value, autopilot = self._name(message), message["param_value"], self.vehicle.autopilot
+        self._written.add(name)
+        if name in names_in(autopilot.gain_sets) and message.system != self.vehicle.system and np.isfinite(value):
+            self._asked[name] = float(int(value)) if autopilot.keeps_whole_numbers else value
+
+    def _position_asked(self, message: Message) -> None:
+        if message["target_system"] == self.vehicle.system:
+            given = ((message["vz"], _IGNORES_VZ), (message["afz"], _IGNORES_AZ))
+            mask = int(message["type_mask"])
+            self._is_fed = any(abs(value) > 0.0 and not mask & ignored for value, ignored in given)
+
+    def _mode_asked(self, _message: Message) -> None:
+        self._events.append(Event(EventKind.COMMAND, self._clock.now_s, "SET_MODE"))
+
+    def _command(self, message: Message) -> None:
+        number = int(message["command"])
+        takes_off = number == _TAKEOFF or (
+            number == _SET_MODE and self.vehicle.autopilot.has_takeoff_mode and message["param3"] == _PX4_TAKEOFF_MODE
+        )
+        if number in _COMMANDS and not (number == _MOTORS and message["param1"]):
+            kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
+            self._sent[number] = Event(kind, self._clock.now_s, f"the command {_COMMANDS[number]}")
+
+    def _answer(self, message: Message) -> None:
+        sent = self._sent.pop(int(message["command"]), None)
+        if sent is not None and message["result"] in _ACCEPTED:
+            self._events.append(sent)
+
+    def _block(self, message: Message) -> None:
+        self._blocks[int(message["seq"])] = message.text("name")
+
+    def _block_asked(self, message: Message) -> None:
+        self._activated.append((self._clock.now_s, int(message["seq"])))
+
+    def _block_entered(self, message: Message) -> None:
+        self._entered.append((self._clock.now_s, int(message["seq"])))
+
+    def _commanded_blocks(self) -> Iterator[Span]:
+        """Every stay in a block that the vehicle entered on command, from the command to that of another one."""
+        before_s = -np.inf
+        for entered_s, number in self._entered:
+            sent_s = [at_s for at_s, sent in self._activated if sent == number and before_s < at_s <= entered_s]
+            others_s = (at_s for at_s, other in (*self._entered, *self._activated) if other != number)
+            if sent_s:
+                yield Span(sent_s[-1], min((at_s for at_s in others_s if at_s >= entered_s), default=np.inf))
+            before_s = entered_s
+
+
+def _table(message: str, reports: "array[float]") -> Table:
+    fields = [source.field for source in SOURCES.values() if source.message == message]
+    rows = np.array(reports).reshape(-1, 1 + len(fields))
+    return dict(zip((_TIME, *fields), rows.T, strict=True))
