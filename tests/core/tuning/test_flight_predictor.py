@@ -119,7 +119,7 @@ def test_gains_that_were_not_flown_are_no_repeat() -> None:
 
 
 def test_without_a_model_there_is_no_predictor() -> None:
-    assert predictor_of(Definition(experiment="takeoff-px4", strategy="manual"), []) is None
+    assert fitted_predictor(Definition(experiment="takeoff-px4", strategy="manual"), []) is None
 
 
 def test_only_the_first_flight_and_those_of_the_fit_need_their_records() -> None:

@@ -42,7 +42,7 @@ def test_it_is_the_first_that_is_offered() -> None:
 
 
 def test_it_refuses_an_experiment_that_it_is_not_made_for() -> None:
-    with pytest.raises(TypeError, match="px4, not with bowl"):
+    with pytest.raises(TypeError, match="does not work with bowl"):
         propose(CALM, QuadraticExperiment(), QuadraticExperiment.space, [fly_bowl(1, 30.0, 40)])
 
 
