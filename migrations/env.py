@@ -8,7 +8,7 @@ from sqlalchemy import Connection, Enum
 from app.common.settings import Settings
 from app.db.models import Base
 from app.db.session import open_engine
-from app.db.types import UtcDateTime
+from app.db.types import FlightEndJson, UtcDateTime
 
 
 def run_migrations(connection: Connection) -> None:
@@ -30,6 +30,8 @@ def in_plain(kind: str, item: object, _autogen: object) -> str | Literal[False]:
         return False
     if isinstance(item, UtcDateTime):
         return "sa.DateTime()"
+    if isinstance(item, FlightEndJson):
+        return "sa.JSON(none_as_null=True)"
     return f"sa.String({item.length})" if isinstance(item, Enum) else False
 
 

@@ -23,6 +23,7 @@ from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
 from app.jobs import service as jobs
 from app.vehicles.base import Ending, FlightRecord
+from app.vehicles.flight_end import Failure, FlightEnd, StopRequest
 
 Json = dict[str, Any]
 
@@ -49,9 +50,12 @@ def create_record(
     until_s: float = 33.0,
     on_request: bool = False,
 ) -> FlightRecord:
-    """What a vehicle leaves behind."""
+    """What a vehicle leaves behind; `reason` are the words of who asked that it ends, or a remark."""
     climb = create_climb(settling_s, until_s=until_s)
-    return FlightRecord(trajectory=climb, ending=ending, reason=reason, on_request=on_request)
+    end = FlightEnd(remarks=(reason,) if reason else ())
+    if on_request:
+        end = FlightEnd(failure=Failure.OPERATOR, request=StopRequest(reason))
+    return FlightRecord(trajectory=climb, ending=ending, end=end)
 
 
 def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> bytes:

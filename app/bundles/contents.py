@@ -1,9 +1,10 @@
-"""Schema of a bundle, version 5, with the validation of its contents.
+"""Schema of a bundle, version 6, with the validation of its contents.
 
 A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
 campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
 in the database (`app.db.trajectories`), with its own checksum. Version 1 lacks `abort_cause`;
-versions below 4 lack rise time, settling time and steady-state error, below 5 the predicted curves of trials.
+versions below 4 lack rise time, settling time and steady-state error, below 5 the predicted curves of trials, below 6
+the ends of flights, of which they have the words.
 """
 
 from functools import cache
@@ -20,20 +21,23 @@ from app.core.tuning.proposals import Advice
 from app.core.tuning.stop_rules import StopVerdict
 from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
+from app.vehicles.flight_end import FlightEnd
 
 FORMAT: Final = "gainline-campaign"
-VERSION: Final = 5
+VERSION: Final = 6
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
 MAX_CAMPAIGNS: Final = 20
 """Maximum number of campaigns in one bundle."""
 
+_MAX_CHARACTERS: Final = 10_000
+
 JsonObject = dict[str, Any]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
 ShortText = Annotated[str, Field(max_length=200)]
-Sentence = Annotated[str, Field(max_length=10_000)]
+Sentence = Annotated[str, Field(max_length=_MAX_CHARACTERS)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Part = Annotated[str, Field(pattern=r"^(records|photos|telemetry)/[0-9a-z-]{1,60}\.[a-z]{3,5}$")]
 Gains = Annotated[dict[ShortText, int | Finite], Field(min_length=1, max_length=50)]
@@ -63,6 +67,13 @@ def _spread_of(given: JsonObject) -> JsonObject:
     return given
 
 
+def _concise(given: FlightEnd) -> FlightEnd:
+    words = given.remarks if given.request is None else (*given.remarks, given.request.words)
+    if sum(map(len, words)) > _MAX_CHARACTERS:
+        raise ValueError(f"has more than {_MAX_CHARACTERS} characters")
+    return given
+
+
 class _Strict(Schema):
     model_config = ConfigDict(extra="forbid", from_attributes=True)
 
@@ -71,7 +82,7 @@ class Manifest(_Strict):
     """Manifest of a bundle. `parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
-    version: Literal[1, 2, 3, 4, 5]
+    version: Literal[1, 2, 3, 4, 5, 6]
     program: ShortText
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
@@ -119,6 +130,7 @@ class Trial(_Strict):
     steady_state_error_m: Finite | None = None
     curve: Annotated[list[tuple[Finite, Finite]], Field(max_length=5000)] | None
     ending: Ending | None
+    end: Annotated[FlightEnd, AfterValidator(_concise)] | None = None
     abort_cause: AbortCause | None = None
     settings: Options
     reason: Sentence

@@ -10,6 +10,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from io import SEEK_END
 from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
 
@@ -22,6 +23,7 @@ from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
+from app.db.earlier_ends import give_end
 from app.db.models import TrajectoryRow
 from app.db.trajectories import unpack
 
@@ -42,6 +44,8 @@ _IN_MEMORY_BYTES: Final = 64 * 2**20
 _METHODS: Final = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 _ENCRYPTED: Final = 0x1
 _WIDTH: Final = 4
+_WITH_ENDS: Final = 6
+"""First version with the ends of flights as codes."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -100,7 +104,9 @@ class Bundle:
         listed = self.manifest.parts.keys() | {MANIFEST}
         if odd := sorted(listed ^ set(self._zip.namelist())):
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip differ: {odd[0][:80]!r}")
-        self.contents = _parsed(CONTENTS, self._listed(CONTENTS, MAX_JSON_BYTES), Contents)
+        tells_ends = self.manifest.version < _WITH_ENDS
+        contents = self._listed(CONTENTS, MAX_JSON_BYTES)
+        self.contents = _parsed(CONTENTS, contents, Contents, look=_give_ends if tells_ends else None)
         self._unpacked = _Unpacked()  # last, because a refused bundle must have nothing to close
 
     def __enter__(self) -> Self:
@@ -229,6 +235,14 @@ def _once(used: set[str], field: str, part: str) -> str:
 def _version(document: object) -> None:
     if isinstance(document, dict) and isinstance(found := document.get("version"), int) and found > VERSION:
         _refuse(f"{MANIFEST}: version", f"is {found}, written by a newer Gainline; this version reads up to {VERSION}")
+
+
+def _give_ends(document: Any) -> None:
+    """Give trials the ends that their reasons tell. Whatever is malformed is refused afterwards."""
+    with suppress(AttributeError, KeyError, TypeError):
+        for campaign in document["campaigns"]:
+            for trial in campaign["trials"]:
+                give_end(trial)
 
 
 def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], None] | None = None) -> M:

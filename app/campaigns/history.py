@@ -35,6 +35,7 @@ from app.db import trajectories
 from app.db.models import CampaignRow, FlightRow, OptionsJson, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
 from app.db.types import utc_now
+from app.vehicles.flight_end import FlightEnd, not_begun
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
@@ -276,10 +277,10 @@ def set_trial_state(row: TrialRow, to: TrialState, *, reason: str | None = None)
         row.reason = reason
 
 
-def set_flight_state(row: FlightRow, to: FlightState, *, problem: str = "") -> None:
+def set_flight_state(row: FlightRow, to: FlightState, *, end: FlightEnd | None = None) -> None:
     """Change a flight's state. Raises ConflictError when the transition is not in the table."""
     row.state = check_transition(FLIGHT_TRANSITIONS, row.state, to, f"Flight {row.id}")
-    row.problem = problem
+    row.end = end
     if to not in ACTIVE_FLIGHT_STATES:
         row.finished_at = utc_now()
 
@@ -293,4 +294,4 @@ def cancel_unflown(trials: Iterable[TrialRow], flight: FlightRow | None, reason:
         if row.state in UNFLOWN_TRIAL_STATES:
             set_trial_state(row, TrialState.CANCELLED, reason=reason)
             if flight is not None and flight.trial_id == row.id and flight.state == FlightState.REQUESTED:
-                set_flight_state(flight, FlightState.CANCELLED, problem=reason)
+                set_flight_state(flight, FlightState.CANCELLED, end=not_begun(reason))

@@ -24,6 +24,7 @@ from app.campaigns.computation import compute
 from app.campaigns.definitions import check_campaign, stored
 from app.campaigns.trials.reviews import classify_trial
 from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
+from app.campaigns.trials.views import reason_of
 from app.cli.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
@@ -44,6 +45,7 @@ from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
 from app.flights.service import plan_trial
 from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError, find_mismatch
+from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind, open_vehicle
 
 
@@ -205,7 +207,8 @@ class _Campaign:
         self._display.planned(planned.number, request.gains)
         outcome = flight_rows.outcome_of(self._fly(request))
         if outcome.record is None:
-            raise VehicleError(f"Flight {planned.number}: {outcome.problem}", hint="Correct this, then run it again.")
+            why = end_text(outcome.end)
+            raise VehicleError(f"Flight {planned.number}: {why}", hint="Correct this, then run it again.")
         with self._database.write() as session:
             flight_rows.record_outcome(session, request.flight_id, outcome)
             trial = history.trial_row(session, request.trial_id)
@@ -363,7 +366,7 @@ def _document(
                 "outcome": trial.state.value,
                 "error": trial.error,
                 "predicted_error": trial.predicted_error if _predicts(trial, display.trials) else None,
-                "reason": trial.reason,
+                "reason": reason_of(trial),
                 "predicted_interval": trial.predicted_interval if _predicts(trial, display.trials) else None,
                 "overrule_reason": trial.overrule_reason,
             }
@@ -381,7 +384,7 @@ def _predicts(trial: TrialRow, trials: Sequence[TrialRow]) -> bool:
 
 
 def _describe_outcome(trial: TrialRow) -> str:
-    return f"{trial.state}: {trial.reason}" if trial.reason else trial.state.value
+    return f"{trial.state}: {reason_of(trial)}" if reason_of(trial) else trial.state.value
 
 
 def _error(value: float | None, unit: str) -> str:

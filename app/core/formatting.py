@@ -121,11 +121,6 @@ def named_flights(numbers: Sequence[int]) -> str:
     return f"flight{'' if len(numbers) == 1 else 's'} {', '.join(listed)}"
 
 
-def without_word(reason: str, word: str) -> str:
-    """The reason as it follows the word of a state: `by the operator` after `Aborted`; others unmodified."""
-    return reason[len(word) :].lstrip() if reason.lower().split(" ")[0] == word.lower() else reason
-
-
 def grouped(amount: int, separator: str = " ") -> str:
     """`2 147 483 647`: digits in groups of three."""
     return f"{amount:,}".replace(",", separator)

@@ -36,7 +36,8 @@ from app.common.states import (
     VehicleState,
 )
 from app.core.tuning.strategy import Kind as ProposalKind
-from app.db.types import UtcDateTime, utc_now
+from app.db.types import FlightEndJson, UtcDateTime, utc_now
+from app.vehicles.flight_end import FlightEnd
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
 JsonObject = dict[str, Any]
@@ -61,6 +62,7 @@ class Base(DeclarativeBase):
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
         datetime: UtcDateTime,
+        FlightEnd: FlightEndJson,
         JsonObject: _JSON,
         GainsJson: _JSON,
         OptionsJson: _JSON,
@@ -248,7 +250,8 @@ class TrialRow(Base, Reported):
     `predicted_error` and `predicted_interval` are those with which it was planned; of a trial without a proposal,
     `predicted` is the curve, else it is the proposal's. `repaired_error` is what the flight would score without its
     `glitches`. `curve` is the scored output in a few [time_s, value] pairs, for small plots. `ending` says how the
-    record ends, whatever the trial's class; `abort_cause` why the flight was aborted.
+    record ends, whatever the trial's class; `abort_cause` why the flight was aborted. `end` is how its last flight
+    ended; `reason` are the words of a person or an import, which are shown instead.
     """
 
     topic = "trial"
@@ -281,6 +284,7 @@ class TrialRow(Base, Reported):
     steady_state_error_m: Mapped[float | None]
     curve: Mapped[list[list[float]] | None]
     ending: Mapped[Ending | None] = mapped_column(String)
+    end: Mapped[FlightEnd | None]
     abort_cause: Mapped[AbortCause | None] = mapped_column(String)
     settings: Mapped[OptionsJson] = mapped_column(default=dict)
     reason: Mapped[str] = mapped_column(default="")
@@ -338,8 +342,8 @@ class FlightRow(Base, Reported):
     """One request to a vehicle, written before it is sent, and what the vehicle answered.
 
     A flight of mode `stage` waits with its gains on the vehicle until an operator sets `take_off_at`, or `stand_down`
-    is the reason why it must not fly. `safe_gains` are those to be restored after it, `restored` those read back then;
-    `battery` is the label of the installed battery.
+    is who asked that it must not fly (a `Requester`). `safe_gains` are those to be restored after it, `restored` those
+    read back then; `battery` is the label of the installed battery; `end` how it ended.
 
     A line of the vehicle's ledger: while it exists, neither its trial nor its campaign can be deleted.
     """
@@ -376,7 +380,7 @@ class FlightRow(Base, Reported):
     battery_v_after: Mapped[float | None]
     speed: Mapped[float | None]
     worker: Mapped[str | None]
-    problem: Mapped[str] = mapped_column(default="")
+    end: Mapped[FlightEnd | None]
     requested_at: Mapped[datetime] = mapped_column(default=utc_now)
     claimed_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]

@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
-REVISION: Final = "0009"
+REVISION: Final = "0010"
 """Revision of the newest migration."""
 
 

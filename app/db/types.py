@@ -1,13 +1,34 @@
 """Column types that SQLite lacks, and the present time."""
 
+from dataclasses import asdict
 from datetime import UTC, datetime
+from typing import Any, Final
 
-from sqlalchemy import DateTime, Dialect
+from pydantic import TypeAdapter
+from sqlalchemy import JSON, DateTime, Dialect
 from sqlalchemy.types import TypeDecorator
+
+from app.vehicles.flight_end import FlightEnd
+
+FLIGHT_END: Final = TypeAdapter(FlightEnd)
+"""Reads what `asdict` made of the end of a flight."""
 
 
 def utc_now() -> datetime:
     return datetime.now(UTC)
+
+
+class FlightEndJson(TypeDecorator[FlightEnd]):
+    """How a flight ended, stored as JSON."""
+
+    impl = JSON(none_as_null=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: FlightEnd | None, _dialect: Dialect) -> dict[str, Any] | None:
+        return None if value is None else asdict(value)
+
+    def process_result_value(self, value: dict[str, Any] | None, _dialect: Dialect) -> FlightEnd | None:
+        return None if value is None else FLIGHT_END.validate_python(value)
 
 
 class UtcDateTime(TypeDecorator[datetime]):

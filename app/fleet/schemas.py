@@ -180,9 +180,9 @@ class Release(Request):
 
 
 class VehicleOrder(Request):
-    """Reason for landing the vehicle, or stopping its motors, now."""
+    """Reason for landing the vehicle, or stopping its motors, now; without one, it is the operator's request."""
 
-    reason: OrderReason = "requested by the operator"
+    reason: OrderReason = ""
 
 
 class OrderAnswer(Schema):

@@ -22,6 +22,7 @@ from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
+from app.vehicles.end_texts import end_text
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS
 
@@ -134,7 +135,7 @@ def _command_outcome(kind: ActKind, flight: FlightRow) -> tuple[ActState, str]:
     if is_done:
         return ActState.DONE, ""
     if is_over:
-        return ActState.FAILED, flight.problem or "The flight had ended before."
+        return ActState.FAILED, end_text(flight.end) or "The flight had ended before."
     return ActState.REQUESTED if flight.state == FlightState.REQUESTED else ActState.RUNNING, ""
 
 
@@ -163,13 +164,13 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
     found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
     shown = [line for line, _ in found[:limit]]
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
-    flights = repository.flights_by_id(session, [identity for why, identity in shown if why in of_flights])
-    acts = repository.acts_by_id(session, [identity for why, identity in shown if why not in of_flights])
+    flights = repository.flights_by_id(session, [identity for purpose, identity in shown if purpose in of_flights])
+    acts = repository.acts_by_id(session, [identity for purpose, identity in shown if purpose not in of_flights])
     items = []
-    for why, identity in shown:
-        if why == "flight":
+    for purpose, identity in shown:
+        if purpose == "flight":
             items.append(_of_flight(flights[identity]))
-        elif why == repository.RESTORE_AFTER_FLIGHT:
+        elif purpose == repository.RESTORE_AFTER_FLIGHT:
             items.append(_of_restoring(vehicle, flights[identity]))
         else:
             items.append(_of_act(acts[identity]))

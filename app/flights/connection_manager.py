@@ -30,6 +30,8 @@ from app.flights.process_messages import CommandForwarded, ConnectionOpened, Con
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import SafeGainsError, VehicleError
+from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
+from app.vehicles.flight_end import StopRequest
 
 T = TypeVar("T")
 
@@ -115,7 +117,7 @@ class VehicleConnectionManager:
 
     # ---- from any thread
 
-    def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
+    def order(self, vehicle_id: int, order: VehicleCommandKind, words: str, by_s: float) -> Future[str]:
         """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was.
 
         A flight that waits for its takeoff stands down as well.
@@ -123,16 +125,17 @@ class VehicleConnectionManager:
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:
             return _refused(NO_LINK)
-        answer = session.send_command(order, reason, by_s)
+        answer = session.send_command(order, words, by_s)
         if (trial_id := session.trial_id) is not None:
-            self._abort_registry.abort(trial_id, reason)
+            self._abort_registry.abort(trial_id, StopRequest(words))
         return answer
 
-    def abort(self, trial_id: int, reason: str) -> bool:
+    def abort(self, trial_id: int, words: str) -> bool:
         """Abort the trial's flight, then record that. Returns whether that trial is being flown here."""
-        accepted = self._abort_registry.abort(trial_id, reason)
+        request = StopRequest(words)
+        accepted = self._abort_registry.abort(trial_id, request)
         if accepted:
-            self._record_in_background(lambda t: record_abort(t, trial_id, reason))
+            self._record_in_background(lambda t: record_abort(t, trial_id, request))
         return accepted
 
     def session(self, vehicle_id: int) -> VehicleConnection:
@@ -326,8 +329,9 @@ class VehicleConnectionManager:
                 if concern and concern != slot.concern:
                     self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern
-            case CommandForwarded(order=order, reason=reason, problem=problem):
+            case CommandForwarded(order=order, words=words, problem=problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
+                reason = words or REQUESTED_BY_OPERATOR
                 self._record_in_background(
                     lambda t: commands.record_command(t, vehicle_id, kind, reason, problem=problem)
                 )

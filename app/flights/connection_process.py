@@ -45,10 +45,11 @@ from app.vehicles.base import (
     FlightRecord,
     InterruptedByOrderError,
     SafeGainsError,
-    StopRequest,
     Vehicle,
     VehicleError,
 )
+from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import get_kind, restore_safe_gains
 
 Staging = Literal["none", "staged", "silent", "lost"]
@@ -218,7 +219,7 @@ class VehicleProcess(FlightLoop):
         if ordered is not None and self._forward_command(ordered) and self._may_interrupt:
             self._end_interruptions()
             raise InterruptedByOrderError(
-                f"It was interrupted: {ordered.order} was commanded ({ordered.reason}).",
+                f"It was interrupted: {ordered.order} was commanded ({ordered.words or REQUESTED_BY_OPERATOR}).",
                 hint="Check what the vehicle is doing, then request it again.",
             )
 
@@ -241,7 +242,7 @@ class VehicleProcess(FlightLoop):
         if not problem:
             try:
                 act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
-                act(ordered.reason)
+                act(ordered.words)
             except VehicleError as error:
                 problem = str(error)
         self._report(ordered, problem)
@@ -250,7 +251,7 @@ class VehicleProcess(FlightLoop):
     def _report(self, ordered: VehicleCommand, problem: str = "") -> None:
         """Report a command that was forwarded to the vehicle, which must confirm that its motors have stopped."""
         is_awaited = ordered.order == "motors off" and not problem
-        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.reason, problem, is_awaited)
+        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, problem, is_awaited)
         self._line.send(forwarded)
         self._stops += [forwarded] * is_awaited
 
@@ -393,10 +394,10 @@ class VehicleProcess(FlightLoop):
         match message:
             case VehicleCommand() if _has_expired(message):
                 self._report(message, _EXPIRED)
-            case VehicleCommand(order=order, reason=reason):
+            case VehicleCommand(order=order, words=words):
                 if order == "motors off":
-                    self._stop = StopRequest(reason, motors_off=True)
-                self._stop = self._stop or StopRequest(reason)
+                    self._stop = StopRequest(words, motors_off=True)
+                self._stop = self._stop or StopRequest(words)
                 self._report(message)
             case _:
                 super()._note(message)

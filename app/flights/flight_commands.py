@@ -7,6 +7,8 @@ from app.campaigns import service as campaigns
 from app.common.states import ActKind
 from app.db.models import CampaignRow, FlightRow
 from app.fleet.control import record_act
+from app.vehicles.end_texts import request_text
+from app.vehicles.flight_end import StopRequest
 
 
 def record_flight_command(
@@ -26,9 +28,9 @@ def record_flight_command(
         )
 
 
-def record_abort(session: Session, trial_id: int, reason: str) -> None:
-    """Record an abort, which everyone may request; `reason` says who did. Raises NotFoundError."""
+def record_abort(session: Session, trial_id: int, request: StopRequest) -> None:
+    """Record an abort, which everyone may request. Raises NotFoundError."""
     trial = history.trial_row(session, trial_id)
     campaign = campaigns.get_row(session, trial.campaign_id)
     if (flight := history.latest_flights(session, [trial_id]).get(trial_id)) is not None:
-        record_flight_command(session, campaign, flight, ActKind.ABORT, by="", reason=reason)
+        record_flight_command(session, campaign, flight, ActKind.ABORT, by="", reason=request_text(request))

@@ -9,9 +9,8 @@ import os
 import select
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
@@ -41,11 +40,10 @@ from app.vehicles.base import (
     FlightRecord,
     SafeGainsError,
     Sample,
-    StopRequest,
     Vehicle,
     VehicleError,
-    motors_off_requested,
 )
+from app.vehicles.flight_end import Requester, StopRequest
 from app.vehicles.jsbsim import prepare
 from app.vehicles.registry import open_vehicle
 
@@ -171,19 +169,12 @@ class FlightLoop(ABC):
 
     def _take_off(self, vehicle: Vehicle, request: FlightRequest, _cleared: TakeOffCommand) -> FlightRecord:
         monitor = FlightMonitor(request, self._publish, self._clock)
-        asked: set[str] = set()
-
-        def should_stop() -> StopRequest | None:
-            if (stop := self._should_stop()) is not None:
-                asked.add(stop.reason)
-            return stop
-
         monitor.phase("flying")
-        record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=should_stop)
+        record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=self._should_stop)
         monitor.flush()
         if record.has_flown:
             monitor.phase("landed")
-        return mark_if_requested(record, asked)
+        return record
 
     def _should_stop(self) -> StopRequest | None:
         """Stop callback, called every few milliseconds in the air; polling the pipe takes microseconds."""
@@ -192,13 +183,13 @@ class FlightLoop(ABC):
                 self._note(message)
         except PipeClosedError:
             self._is_worker_gone = True
-            self._stop = self._stop or StopRequest("the worker has exited")
+            self._stop = self._stop or StopRequest(by=Requester.WORKER_EXITED)
         return self._stop
 
     def _note(self, message: ToVehicleProcess) -> None:
         """Note a reason to end the flight: the first one counts."""
         if isinstance(message, CancelFlight) and message.trial_id == self._trial_id:
-            self._stop = self._stop or StopRequest(message.reason)
+            self._stop = self._stop or message.request
 
 
 class SimulationLoop(FlightLoop):
@@ -239,14 +230,6 @@ def run_simulations(pipe: Connection, data_dir: Path, clock: Clock) -> None:
         SimulationLoop(WorkerPipe(pipe), data_dir, clock).run()
     except PipeClosedError:
         os._exit(0)
-
-
-def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
-    """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
-    by the worker, and not for a limit."""
-    begins = tuple(text for reason in reasons for text in (reason, motors_off_requested(reason)))
-    asked = record.ending == "aborted" and record.reason.startswith(begins)
-    return replace(record, on_request=asked)
 
 
 def failure_from(error: GainlineError) -> FlightFailure:

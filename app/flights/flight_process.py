@@ -24,6 +24,7 @@ from app.flights.process_messages import (
 )
 from app.processes import ChildProcess, ProcessDiedError
 from app.vehicles.base import VehicleError
+from app.vehicles.flight_end import StopRequest
 
 
 class FlightProcess:
@@ -69,9 +70,9 @@ class FlightProcess:
     def cancel_take_off(self) -> None:
         self._post(CancelTakeOff())
 
-    def cancel_flight(self, trial_id: int, reason: str) -> None:
+    def cancel_flight(self, trial_id: int, request: StopRequest) -> None:
         """End that flight now; a vehicle that has not taken off stays on the ground."""
-        self._post(CancelFlight(trial_id, reason))
+        self._post(CancelFlight(trial_id, request))
 
     def close(self) -> None:
         """Let the process end; kill it if it does not."""

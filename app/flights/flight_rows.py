@@ -23,18 +23,19 @@ from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import FlightState, TrialState, VehicleState
-from app.core.formatting import without_word
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.flights.abort import PROGRAM_STOPPED
 from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord, find_mismatch
+from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import FlightEnd, GainsLeft, Landing, Requester, StopRequest, not_begun, withdrawn_by
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
+_NO_RECORD: Final = "its process ended without a record"
 _WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "the worker stopped before lift-off"}
 
 
@@ -43,34 +44,48 @@ class FlightOutcome:
     """Outcome of a flight, as far as the worker knows.
 
     With a `record` the flight took place. Without one, `lifted_off` says whether the vehicle may have left the ground,
-    and `withdrawn` whether the flight was ended on request before that. `concern`: the safe gains could not be verified
-    afterwards. `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were
-    read back.
+    and `withdrawn` whether the flight was ended on request before that; `end` is how, or `problem` what went wrong.
+    `concern`: the safe gains could not be verified afterwards. `unheard`: the flight's process ended without reporting
+    whether they are restored. `restored`: they were read back.
     """
 
     record: FlightRecord | None = None
     lifted_off: bool = False
     withdrawn: bool = False
+    end: FlightEnd | None = None
     problem: str = ""
     concern: str = ""
     unheard: bool = False
     restored: Mapping[str, float] | None = None
+
+    @property
+    def ended(self) -> FlightEnd:
+        """How the flight ended, as its record, the request or the problem tells."""
+        if self.record is not None:
+            return self.record.end
+        if self.lifted_off:
+            return FlightEnd(remarks=(self.problem or _NO_RECORD,), landed=Landing.UNKNOWN)
+        return self.end or not_begun(self.problem)
+
+    def gains_left(self, end: FlightEnd, safe_gains: Mapping[str, float] | None) -> FlightEnd:
+        """The end, with what was read back of the safe gains."""
+        if self.restored is None:
+            return end
+        if self.restored != safe_gains:
+            return replace(end, gains_left=GainsLeft.OTHER)
+        return end if self.concern else replace(end, gains_left=GainsLeft.SAFE)
 
 
 def outcome_of(record: FlightRecord) -> FlightOutcome:
     """Outcome of a flight with this record, which is dropped if nothing was flown."""
     if record.has_flown:
         return FlightOutcome(record=record, lifted_off=True)
-    return FlightOutcome(withdrawn=record.on_request, problem=_reason_before_lift_off(record))
+    return FlightOutcome(withdrawn=record.end.request is not None, end=record.end)
 
 
-def _reason_before_lift_off(record: FlightRecord) -> str:
-    """`aborted before lift-off by the operator`, `aborted before lift-off: too close`, `ended before lift-off: …`."""
-    if record.reason.startswith(PROGRAM_STOPPED):
-        return record.reason
-    word = "aborted" if record.on_request else "ended"
-    rest = without_word(record.reason, word)
-    return f"{word} before lift-off: {rest}" if rest == record.reason else f"{word} before lift-off {rest}".rstrip()
+def withdrawn_outcome(request: StopRequest) -> FlightOutcome:
+    """Outcome of a flight that was aborted before its vehicle was commanded to take off."""
+    return FlightOutcome(withdrawn=True, end=withdrawn_by(request))
 
 
 _WITH_ALL: Final = (
@@ -131,7 +146,7 @@ def _withdraw(flight: FlightRow, reason: str) -> None:
     set_flight_state(
         flight,
         FlightState.CANCELLED,
-        problem=f"The flight was not started: {reason}. Request it again if it is still needed.",
+        end=not_begun(f"The flight was not started: {reason}. Request it again if it is still needed."),
     )
 
 
@@ -165,8 +180,9 @@ def record_staged(session: Session, flight_id: int, read_back: dict[str, float])
     fleet.set_vehicle_state(flight.vehicle, VehicleState.STAGED)
 
 
-def clearance_of(session: Session, flight_id: int) -> tuple[bool, str | None]:
-    """Whether a staged flight may take off now, and why it must not take place at all; (False, None) while it waits.
+def clearance_of(session: Session, flight_id: int) -> tuple[bool, FlightOutcome | None]:
+    """Whether a staged flight may take off now, and its outcome if it must not take place at all; (False, None) while
+    it waits.
 
     It may once its operator has requested the takeoff, for REQUEST_TIMEOUT (10 s): nothing takes off later than its
     operator expects. It must not when it was unstaged, its trial was cancelled, or the takeoff could not begin in
@@ -176,22 +192,23 @@ def clearance_of(session: Session, flight_id: int) -> tuple[bool, str | None]:
     return _clearance(flight)
 
 
-def _clearance(flight: FlightRow) -> tuple[bool, str | None]:
-    if (reason := _stand_down_reason(flight)) is not None:
-        return False, reason
+def _clearance(flight: FlightRow) -> tuple[bool, FlightOutcome | None]:
+    if flight.state == FlightState.RUNNING and flight.stand_down:
+        end = FlightEnd(request=StopRequest(by=Requester(flight.stand_down)), landed=Landing.STAYED)
+        return False, FlightOutcome(withdrawn=True, end=end)
+    if why := _stand_down_reason(flight):
+        return False, FlightOutcome(withdrawn=True, problem=why)
     return _may_take_off(flight), None
 
 
-def _stand_down_reason(flight: FlightRow) -> str | None:
+def _stand_down_reason(flight: FlightRow) -> str:
     if flight.state != FlightState.RUNNING:
         return f"the flight is {flight.state}"
-    if flight.stand_down:
-        return flight.stand_down
     if flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
         return f"the trial is {flight.trial.state}"
     if flight.mode == "stage" and flight.take_off_at is not None and not _may_take_off(flight):
         return f"the takeoff did not start within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's request"
-    return None
+    return ""
 
 
 def _may_take_off(flight: FlightRow) -> bool:
@@ -209,9 +226,11 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     """
     flight, campaign = _read_running(session, flight_id)
     trial = flight.trial
-    may_take_off, reason = _clearance(flight)
+    may_take_off, stands_down = _clearance(flight)
     if not may_take_off:
-        why = reason or "its takeoff has not been requested"
+        why = "its takeoff has not been requested"
+        if stands_down is not None:
+            why = end_text(stands_down.ended)
         raise ConflictError(
             f"Flight {trial.number} cannot be flown: {why}.", hint="Stage it again if it is still needed."
         )
@@ -221,7 +240,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
             hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")
-    trial.flown_at = utc_now()
+    trial.end, trial.flown_at = None, utc_now()
     fleet.set_vehicle_state(flight.vehicle, VehicleState.FLYING)
     proposals.start_flying(campaign)
 
@@ -235,15 +254,16 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     when the record cannot be stored.
     """
     flight, campaign = _read(session, flight_id)
-    outcome = _with_stop_explained(flight, outcome)
+    end = outcome.gains_left(outcome.ended if flight.end is None else flight.end, flight.safe_gains)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
-            _land(session, campaign, flight, outcome.record)
+            _land(session, campaign, flight, replace(outcome.record, end=end))
         elif outcome.lifted_off:
-            _lose(session, campaign, flight, outcome.problem or "its process ended without a record")
+            _lose(session, campaign, flight, end)
         else:
             state = FlightState.CANCELLED if outcome.withdrawn else FlightState.FAILED
-            _end_unflown(session, campaign, flight, state, outcome.problem)
+            _end_unflown(session, campaign, flight, state, end)
+    flight.end = end
     if outcome.restored is not None:
         flight.restored, flight.restored_at = dict(outcome.restored), utc_now()
         fleet.hold_gains(flight.vehicle, outcome.restored)
@@ -281,45 +301,29 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
     proposals.history_changed(session, campaign)
 
 
-def _with_stop_explained(flight: FlightRow, outcome: FlightOutcome) -> FlightOutcome:
-    """Say what became of the vehicle where the reason is only that Gainline was stopped."""
-    if outcome.restored is None or outcome.restored != flight.safe_gains or outcome.concern:
-        return outcome
-    if outcome.record is None:
-        what = "It restored the safe gains before the takeoff. Request the flight again if it is still needed."
-        return replace(outcome, problem=_completed(outcome.problem, what))
-    what = "It landed the vehicle and restored the safe gains."
-    return replace(outcome, record=replace(outcome.record, reason=_completed(outcome.record.reason, what)))
-
-
-def _completed(reason: str, what: str) -> str:
-    """The reason, with `what` after the sentence that Gainline was stopped, if that is the reason."""
-    if not reason.startswith(PROGRAM_STOPPED):
-        return reason
-    remarks = reason.removeprefix(PROGRAM_STOPPED).removeprefix(".").strip()
-    return " ".join(part for part in (f"{PROGRAM_STOPPED}.", what, remarks) if part)
-
-
 def _land(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
     _capture(session, campaign, flight, record)
-    _end(flight, FlightState.ABORTED if record.ending == "aborted" else FlightState.LANDED, problem=record.reason)
+    _end(flight, FlightState.ABORTED if record.ending == "aborted" else FlightState.LANDED, record.end)
     proposals.finish_flying(session, campaign)
 
 
-def _lose(session: Session, campaign: CampaignRow, flight: FlightRow, problem: str) -> None:
+def _lose(session: Session, campaign: CampaignRow, flight: FlightRow, end: FlightEnd) -> None:
     """Record that it is unknown how the flight ended."""
-    set_trial_state(flight.trial, TrialState.LOST, reason=problem)
-    _end(flight, FlightState.LOST, problem=problem)
+    set_trial_state(flight.trial, TrialState.LOST, reason="")
+    flight.trial.end = end
+    _end(flight, FlightState.LOST, end)
     _doubt_vehicle(flight)
     proposals.finish_flying(session, campaign)
 
 
-def _end_unflown(session: Session, campaign: CampaignRow, flight: FlightRow, state: FlightState, problem: str) -> None:
+def _end_unflown(
+    session: Session, campaign: CampaignRow, flight: FlightRow, state: FlightState, end: FlightEnd
+) -> None:
     was_flying = flight.trial.state == TrialState.FLYING
     if flight.trial.state in {TrialState.STAGED, TrialState.FLYING}:
-        set_trial_state(flight.trial, TrialState.PLANNED, reason=problem)
-        flight.trial.flown_at = None
-    _end(flight, state, problem=problem)
+        set_trial_state(flight.trial, TrialState.PLANNED, reason="")
+        flight.trial.end, flight.trial.flown_at = end, None
+    _end(flight, state, end)
     if was_flying:
         proposals.finish_flying(session, campaign)
 
@@ -329,9 +333,9 @@ def _give_up(session: Session, campaign: CampaignRow, flight: FlightRow, problem
     lifted_off = flight.trial.state == TrialState.FLYING
     if flight.state == FlightState.RUNNING:
         if lifted_off:
-            _lose(session, campaign, flight, problem)
+            _lose(session, campaign, flight, FlightEnd(remarks=(problem,), landed=Landing.UNKNOWN))
         else:
-            _end_unflown(session, campaign, flight, FlightState.FAILED, problem)
+            _end_unflown(session, campaign, flight, FlightState.FAILED, not_begun(problem))
     _doubt_vehicle(flight)
     return lifted_off
 
@@ -353,22 +357,12 @@ def _doubt_vehicle(flight: FlightRow) -> None:
 
 
 def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
-    capture(
-        session,
-        campaign,
-        flight.trial,
-        record.trajectory,
-        ending=record.ending,
-        reason=record.reason,
-        on_request=record.on_request,
-    )
-    if record.on_request and record.reason.startswith(PROGRAM_STOPPED):
-        flight.trial.abort_cause = "something else"  # known: there is nothing to ask the operator
+    capture(session, campaign, flight.trial, record.trajectory, ending=record.ending, end=record.end)
     flight.trial.settings = dict(record.settings)
     flight.battery_v_before = starting_battery_v(record.trajectory)
     flight.battery_v_after = landing_battery_v(record.trajectory)
 
 
-def _end(flight: FlightRow, state: FlightState, *, problem: str = "") -> None:
-    set_flight_state(flight, state, problem=problem)
+def _end(flight: FlightRow, state: FlightState, end: FlightEnd) -> None:
+    set_flight_state(flight, state, end=end)
     fleet.set_state_after_flight(flight.vehicle)

@@ -16,6 +16,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
 from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, OptionValue
+from app.vehicles.flight_end import StopRequest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +79,7 @@ class CancelFlight:
     """To the process, at any moment: end this flight now. A vehicle that has not taken off stays on the ground."""
 
     trial_id: int
-    reason: str
+    request: StopRequest
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,12 +179,13 @@ class VehicleResponse:
 class VehicleCommand:
     """To the process, at any moment: land, or motors off.
 
-    Not to be carried out after `by_s` of this computer's monotonic clock, s. The answer carries the same `number`.
+    `words` are those of who asked, if any. Not to be carried out after `by_s` of this computer's monotonic clock, s.
+    The answer carries the same `number`.
     """
 
     number: int
     order: VehicleCommandKind
-    reason: str
+    words: str
     by_s: float
 
 
@@ -194,7 +196,7 @@ class CommandForwarded:
 
     number: int
     order: VehicleCommandKind
-    reason: str
+    words: str
     problem: str = ""
     is_awaited: bool = False
 

@@ -7,15 +7,18 @@ import hashlib
 import io
 import json
 import os
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from app.common.errors import StorageError
 from app.core.records.trajectory import Trajectory
+from app.db.earlier_ends import landing_of, read_end
+from app.db.types import FLIGHT_END
 from app.vehicles.base import Ending, FlightRecord, OptionValue
 
 RESERVED_BYTES: Final = 4 * 2**20
@@ -119,9 +122,7 @@ def _pack(spooled: SpooledRecord) -> bytes:
     header = {
         "flight_id": spooled.flight_id,
         "ending": record.ending,
-        "failure": record.failure,
-        "reason": record.reason,
-        "on_request": record.on_request,
+        "end": asdict(record.end),
         "settings": dict(record.settings),
         "source": trajectory.source,
         "clock": trajectory.clock,
@@ -148,12 +149,16 @@ def _unpack(content: bytes) -> SpooledRecord:
         FlightRecord(
             trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
             ending=ending,
-            failure=header.get("failure", ""),
-            reason=header["reason"],
-            on_request=header.get("on_request", False),
+            end=FLIGHT_END.validate_python(header["end"] if "end" in header else _earlier_end(header)),
             settings=settings,
         ),
     )
+
+
+def _earlier_end(header: Mapping[str, Any]) -> Any:
+    """The end of a flight whose worker was of a version before 0.4.0."""
+    asked, landed = header.get("on_request", False), landing_of(header["settings"])
+    return read_end(header["reason"], on_request=asked, landed=landed)
 
 
 def _sync_folder(folder: Path) -> None:

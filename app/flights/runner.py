@@ -34,6 +34,7 @@ from app.flights.record_spool import Spool
 from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
+from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind
 
 STAGED_FOR_S: Final = 600.0
@@ -123,8 +124,8 @@ class FlightRunner:
                 self._abort_registry.unregister(request.trial_id)
 
     def _fly(self, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
-        if flag.reason is not None:
-            return FlightOutcome(withdrawn=True, problem=flag.reason)
+        if flag.request is not None:
+            return flight_rows.withdrawn_outcome(flag.request)
         try:
             self._spool.reserve(request.flight_id)
             telemetry_log(self._data_dir, request.flight_id).parent.mkdir(exist_ok=True)
@@ -134,7 +135,7 @@ class FlightRunner:
         try:
             return self._fly_on_backend(backend, request, flag)
         finally:
-            flag.add_listener(lambda _reason: None)
+            flag.add_listener(lambda _request: None)
 
     def _acquire_backend(self, request: FlightRequest) -> FlightProcess:
         """Return the process that flies the vehicle. Raises VehicleError when the vehicle needs a connection and has
@@ -148,7 +149,7 @@ class FlightRunner:
         ended = FlightOutcome()
         try:
             self._phase(request, "staging")
-            flag.add_listener(lambda reason: backend.cancel_flight(request.trial_id, reason))
+            flag.add_listener(lambda stop: backend.cancel_flight(request.trial_id, stop))
             for message in backend.fly(request):
                 match message:
                     case Telemetry() | FlightPhase():
@@ -183,7 +184,7 @@ class FlightRunner:
             if mismatch := find_mismatch(read_back, request.gains):
                 ended = FlightOutcome(problem=f"The vehicle did not accept the gains: {mismatch}. It was not flown.")
             elif (withdrawn := self._await_takeoff_clearance(request, flag, backend)) is not None:
-                ended = FlightOutcome(withdrawn=True, problem=withdrawn)
+                ended = withdrawn
             else:
                 self._store(lambda session: flight_rows.record_lift_off(session, request.flight_id))
         except GainlineError as error:
@@ -196,30 +197,31 @@ class FlightRunner:
             backend.cancel_take_off()
         return ended
 
-    def _await_takeoff_clearance(self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess) -> str | None:
-        """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or why it must
-        not."""
+    def _await_takeoff_clearance(
+        self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess
+    ) -> FlightOutcome | None:
+        """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or the outcome of
+        the flight that must not take place."""
         if request.mode == "fly":
-            return flag.reason
+            return None if flag.request is None else flight_rows.withdrawn_outcome(flag.request)
         self._phase(request, "staged")
         until_s = self._clock.now_s() + STAGED_FOR_S
         while self._clock.now_s() < until_s:
-            if flag.reason is not None:
-                return flag.reason
-            if not backend.alive:
-                return "the vehicle's process ended"
-            if backend.staging_lost:
-                return backend.staging_lost
+            if flag.request is not None:
+                return flight_rows.withdrawn_outcome(flag.request)
+            if why := backend.staging_lost if backend.alive else "the vehicle's process ended":
+                return FlightOutcome(withdrawn=True, problem=why)
             try:
                 with self._database.read() as session:
-                    may_take_off, reason = flight_rows.clearance_of(session, request.flight_id)
-                if may_take_off or reason is not None:
-                    return reason
+                    may_take_off, stands_down = flight_rows.clearance_of(session, request.flight_id)
+                if may_take_off or stands_down is not None:
+                    return stands_down
             except StorageError as error:
                 _log.error("the takeoff request cannot be read", why=str(error))
                 self._clock.wait_s(RETRY_S)
             self._clock.wait_s(POLL_INTERVAL_S)
-        return f"its takeoff was not requested within {STAGED_FOR_S / 60:g} minutes"
+        why = f"its takeoff was not requested within {STAGED_FOR_S / 60:g} minutes"
+        return FlightOutcome(withdrawn=True, problem=why)
 
     def _phase(self, request: FlightRequest, phase: Phase, note: str = "") -> None:
         self._publish(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase=phase, note=note))
@@ -229,7 +231,7 @@ class FlightRunner:
 
         Only the end of the worker leaves a flight in state running.
         """
-        _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
+        _log.info("flight over", recorded=ended.record is not None, end=end_text(ended.ended), concern=ended.concern)
         flight_id = request.flight_id
         if ended.record is not None:
             self._spool_record(request, ended.record)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -41,8 +42,10 @@ from app.flights.flight_commands import record_abort, record_flight_command
 from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
 from app.flights.schemas import TrialReadiness
 from app.live.hub import VehicleReport
-from app.vehicles.base import LANDED
+from app.vehicles.end_texts import unstaged_text
+from app.vehicles.flight_end import Landing, Requester, StopRequest, withdrawn_by
 
+_NOT_LANDED: Final = frozenset({Landing.FELL, Landing.UNKNOWN})
 ReportOf = Callable[[int], VehicleReport]
 """What is known of a vehicle at this moment, by its id."""
 
@@ -171,7 +174,7 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         abort_cause_open=row.abort_cause == "operator",
         failed_checks=tuple(str(check["title"]) for check in vehicle.checks or () if not check["passed"]),
         was_lost_in_flight=_was_lost_in_flight(row, flight),
-        has_not_landed=not row.settings.get(LANDED, True),
+        has_not_landed=row.ending is not None and row.end is not None and row.end.landed in _NOT_LANDED,
         flown_for_s=0.0 if row.flown_at is None else (utc_now() - row.flown_at).total_seconds(),
     )
     return readiness_of(standing, report_of(vehicle.id))
@@ -219,22 +222,24 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "unstage", row.state, f"Flight {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
-    reason = f"unstaged {_origin(campaign.vehicle, context)}"
+    requester = _requester(campaign.vehicle, context)
     flight = _staged(session, row)
-    flight.stand_down = reason
+    flight.stand_down = requester
     operator = control_of(campaign.vehicle) if is_in_control(campaign.vehicle, context) else None
     by = "" if operator is None else operator.operator
-    record_flight_command(session, campaign, flight, ActKind.UNSTAGE, by=by, reason="" if by else reason)
+    record_flight_command(
+        session, campaign, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester)
+    )
     return trial_view(session, campaign, row)
 
 
-def _origin(vehicle: VehicleRow, context: RequestContext) -> str:
-    """Where a request comes from that is open to everyone: `by the operator`, `from another browser`, …"""
+def _requester(vehicle: VehicleRow, context: RequestContext) -> Requester:
+    """Who makes a request that is open to everyone."""
     if is_in_control(vehicle, context):
-        return "by the operator"
+        return Requester.OPERATOR
     if context.caller.place is RequestOrigin.ELSEWHERE:
-        return "from another device"
-    return "from another browser" if context.from_our_page else "by a script"
+        return Requester.DEVICE
+    return Requester.BROWSER if context.from_our_page else Requester.SCRIPT
 
 
 def _staged(session: Session, row: TrialRow) -> FlightRow:
@@ -243,12 +248,13 @@ def _staged(session: Session, row: TrialRow) -> FlightRow:
         raise ConflictError(f"Flight {row.number} flies without staging.", hint="Watch it, or abort it.")
     if flight.stand_down:
         raise ConflictError(
-            f"Flight {row.number} is being unstaged: {flight.stand_down}.", hint="Wait until it is planned again."
+            f"Flight {row.number} is being unstaged: {unstaged_text(Requester(flight.stand_down))}.",
+            hint="Wait until it is planned again.",
         )
     return flight
 
 
-def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer:
+def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
     """Abort a flight that no worker has claimed; a flight that is over is left as it is.
 
     Raises ConflictError when no flight was requested, or when the worker that flies it does not answer.
@@ -256,8 +262,8 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
     row = history.trial_row(session, trial_id)
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        set_flight_state(flight, FlightState.CANCELLED, problem=reason)
-        record_abort(session, trial_id, reason)
+        set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
+        record_abort(session, trial_id, StopRequest(words))
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(

@@ -112,7 +112,7 @@ class VehicleConnection(FlightProcess):
         assert isinstance(response, VehicleResponse), response
         return response
 
-    def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
+    def send_command(self, order: VehicleCommandKind, words: str, by_s: float) -> Future[str]:
         """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was."""
         answer: Future[str] = Future()
         if len(self._orders) >= MAX_UNANSWERED_ORDERS:
@@ -120,7 +120,7 @@ class VehicleConnection(FlightProcess):
             return answer
         number = next(self._numbers)
         self._orders[number] = answer
-        command = VehicleCommand(number, order, reason, by_s)
+        command = VehicleCommand(number, order, words, by_s)
         if not (self._open and self.alive and self._post(command)):
             self._answer_order(number, NO_LINK)
         return answer

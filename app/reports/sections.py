@@ -17,13 +17,15 @@ from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
 from app.core.experiments.base import Experiment
-from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent, without_word
+from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
 from app.core.policy import Gain, Gains
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow
 from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
+from app.vehicles.end_texts import cause_text
+from app.vehicles.flight_end import FlightEnd
 from app.vehicles.registry import VEHICLE_KINDS
 
 
@@ -220,7 +222,8 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
         if (kind := _ENDINGS.get(trial.state)) is not None:
-            yield Anomaly(trial.number, kind, f"{_reason(trial, kind)}{_counting(trial)}")
+            reason = trial.given_reason or _end_beside(trial.state, trial.end) or "No reason was given."
+            yield Anomaly(trial.number, kind, f"{reason}{_counting(trial)}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
             yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} Refused by the gate: {refused}")
@@ -233,9 +236,10 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
         if trial.glitches and trial.repaired_error is not None:
             repaired = f"Without the glitches the error would be {short(trial.repaired_error)} {error_unit}."
             yield Anomaly(trial.number, "Glitch in the record", repaired)
-        if trial.flight is not None and trial.flight.problem and not (kind and trial.flight.problem == trial.reason):
-            kind = _ENDINGS.get(trial.flight.state, "Vehicle problem")
-            yield Anomaly(trial.number, kind, without_word(trial.flight.problem, kind))
+        if trial.flight is not None and trial.flight.problem and (trial.given_reason or not kind):
+            kind = _ENDINGS.get(trial.flight.state)
+            end = trial.flight.problem if kind is None else _end_beside(trial.flight.state, trial.flight.end)
+            yield Anomaly(trial.number, kind or "Vehicle problem", end)
 
 
 def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
@@ -249,8 +253,9 @@ def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
         )
 
 
-def _reason(trial: Trial, kind: str) -> str:
-    return without_word(trial.reason, kind) or "No reason was given."
+def _end_beside(state: str, end: FlightEnd | None) -> str:
+    """How a flight ended, beside the word for its state."""
+    return "" if end is None else cause_text(end, "" if state == "aborted" else "aborted")
 
 
 def _counting(trial: Trial) -> str:

@@ -34,7 +34,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import RETRY_S, Database, retry_until_stored
-from app.flights.abort import PROGRAM_STOPPED, AbortRegistry
+from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
 from app.jobs.runner import JobRunner, recover
@@ -44,6 +44,7 @@ from app.processes.locks import LockedError, exclusive
 from app.processes.pool import ComputePool
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
+from app.vehicles.flight_end import Requester, StopRequest
 
 FLIGHTS_AT_ONCE: Final = 8
 ACTS_AT_ONCE: Final = 8
@@ -127,7 +128,7 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
     def handle_signals() -> None:
         while True:
             ending.set(f"the worker was stopped ({asked.get()})")
-            abort_registry.abort_all(PROGRAM_STOPPED)
+            abort_registry.abort_all(StopRequest(by=Requester.PROGRAM_STOPPED))
 
     threading.Thread(target=handle_signals, name="signals", daemon=True).start()
     for number in signals:

@@ -17,6 +17,8 @@ from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
+from app.vehicles.end_texts import cause_text
+from app.vehicles.flight_end import FlightEnd, Landing, StopRequest
 
 OptionValue = bool | int | float | str
 Ending = Literal["completed", "aborted", "invalid"]
@@ -83,48 +85,28 @@ class FlightOptions:
         return self.window_s + RECORDED_BEYOND_S
 
 
-@dataclass(frozen=True, slots=True)
-class StopRequest:
-    """Request to end a flight early. `motors_off` stops the motors at once, at any height; otherwise the vehicle
-    lands."""
-
-    reason: str
-    motors_off: bool = False
-
-
 ShouldStop = Callable[[], StopRequest | None]
-
-
-def requested(command: str, reason: str) -> str:
-    """`Land was requested: too low.`; `Land was requested by the operator.` for a reason that begins so."""
-    return f"{command} was {reason}." if reason.startswith("requested ") else f"{command} was requested: {reason}."
-
-
-def motors_off_requested(reason: str) -> str:
-    return requested("Motors off", reason)
-
-
-LANDED: Final = "landed"
-"""Key in the settings of a record: false if the vehicle fell, or was not seen to stop its motors on the ground."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecord:
-    """Result of a flight: its trajectory at full rate, how it ended, and the reason if it ended early.
-
-    If `should_stop` ended the flight before any limit did, `reason` begins with the reason of the stop request, or with
-    `motors_off_requested` of it. The caller that requested the stop then sets `on_request` of the aborted flight.
-    Without `has_flown` nothing was flown, because the vehicle has certainly never left the ground. `failure` is the
-    number of the failure in docs/real-flight.md, "F1" to "F14c"; empty without one.
-    """
+    """Result of a flight: its trajectory at full rate, and how it ended. If `should_stop` ended it before any limit
+    did, that is the `request` of its `end`."""
 
     trajectory: Trajectory
     ending: Ending
-    failure: str = ""
-    reason: str = ""
-    on_request: bool = False
-    has_flown: bool = True
+    end: FlightEnd = field(default_factory=FlightEnd)
     settings: Mapping[str, OptionValue] = field(default_factory=dict)
+
+    @property
+    def has_flown(self) -> bool:
+        """Whether anything was flown: False if the vehicle has certainly never left the ground."""
+        return self.end.landed is not Landing.STAYED
+
+    @property
+    def reason(self) -> str:
+        """Why it ended early or does not count, for people."""
+        return cause_text(self.end)
 
 
 class Vehicle(Protocol):
@@ -276,11 +258,11 @@ class ConnectedVehicle(Vehicle, Protocol):
         for gains that the vehicle cannot hold."""
         ...
 
-    def land(self, reason: str) -> None:
-        """Command the vehicle to land at once, in any state."""
+    def land(self, words: str) -> None:
+        """Command the vehicle to land at once, in any state; with the words of who asked, if any."""
         ...
 
-    def motors_off(self, reason: str) -> None:
+    def motors_off(self, words: str) -> None:
         """Stop the motors at once, at any height."""
         ...
 

@@ -30,12 +30,12 @@ from app.vehicles.base import (
     OptionValue,
     Sample,
     ShouldStop,
-    StopRequest,
     Vehicle,
     VehicleOption,
 )
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options, VehicleKind
-from app.vehicles.simulated import GainHolder, Pacer, accept_gains
+from app.vehicles.simulated import GainHolder, Pacer, accept_gains, end_of
 
 GAIN_NAMES: Final = PitchTracking.space.names
 LOG_NOISE: Final = np.array([3.0, math.radians(0.1), 0.5, math.radians(0.2), math.radians(0.1)])
@@ -79,8 +79,7 @@ class LinearAircraft(GainHolder):
         return FlightRecord(
             trajectory=_trajectory(detail),
             ending="completed" if stop is None else "aborted",
-            reason="" if stop is None else stop.reason,
-            has_flown=flown_steps > 0,
+            end=end_of(stop, has_flown=flown_steps > 0),
             settings=self._settings,
         )
 

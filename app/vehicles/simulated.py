@@ -34,9 +34,9 @@ from app.vehicles.base import (
     OptionValue,
     Sample,
     ShouldStop,
-    StopRequest,
     VehicleError,
 )
+from app.vehicles.flight_end import Failure, FlightEnd, StopRequest, withdrawn_by
 from app.vehicles.kernels import (
     ALTITUDE,
     CHANNELS,
@@ -180,6 +180,13 @@ class GainHolder:
         self._staged = False
 
 
+def end_of(stop: StopRequest | None, *, has_flown: bool) -> FlightEnd:
+    """Return the end of a simulated flight, which only a request ends early."""
+    if stop is None or has_flown:
+        return FlightEnd(failure=None if stop is None else Failure.OPERATOR, request=stop)
+    return withdrawn_by(stop)
+
+
 class SimulatedVehicle(GainHolder):
     """Simulated vehicle that holds the loop's three integer gains and starts every flight from rest on the ground.
 
@@ -221,8 +228,7 @@ class SimulatedVehicle(GainHolder):
         return FlightRecord(
             trajectory=trajectory_of(flown, self.kind),
             ending="completed" if stop is None else "aborted",
-            reason="" if stop is None else stop.reason,
-            has_flown=stop is None or bool(flown[:, ALTITUDE].max() > _LANDED_M),
+            end=end_of(stop, has_flown=bool(flown[:, ALTITUDE].max() > _LANDED_M)),
             settings=self._settings,
         )
 

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import Final
 
 from app.simdrone.drone import BOOT_S
+from app.vehicles.flight_end import Failure
 from bench.hazards.cases import (
     ABORT,
     FALSE_ALTITUDES,
@@ -426,7 +427,7 @@ class _Checker:
         may_be_suspect = any(each.kind in GAIN_FAILURES and each.begun_s <= max(left) for each in self.result.injected)
         may_be_suspect |= self.states.first_s(State.RECORD) is None and self._may_have_stayed_down()
         may_be_suspect |= self.within(self.of(TAKEN_OVER), State.ARM, State.TAKEOFF) > 0.0
-        may_be_suspect |= "The steps were not flown." in self.result.reason
+        may_be_suspect |= self.result.failure is Failure.NOT_SETTLED
         if first is Command.GAIN and not may_be_suspect:
             yield "the safe gains were sent before Land, though the gains were not suspect"
         is_refused = self.result.outcome == "refused" and self.began_in(ABORT, *AIR)

@@ -6,6 +6,7 @@ from typing import Final
 
 from app.autopilots.experiments import get_experiment
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
+from app.vehicles.flight_end import Failure
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import Case
@@ -48,6 +49,7 @@ class TrialResult:
     injected: tuple[InjectedFault, ...]
     states: TrialStates = field(repr=False)
     overridden: tuple[Overridden, ...] = ()
+    failure: Failure | None = None
 
 
 def run_trial(case: Case) -> TrialResult:
@@ -106,6 +108,7 @@ def _end(rig: Rig, record: FlightRecord | None, vehicle: str, reason: str) -> Tr
         injected=tuple(rig.injected),
         states=rig.states,
         overridden=tuple(rig.overridden),
+        failure=None if record is None else record.end.failure,
     )
 
 

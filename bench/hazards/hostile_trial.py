@@ -307,7 +307,7 @@ def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
         rig.identity, rig.is_flying = vehicle.identity, True
         order = FlightOptions(seed=1, window_s=rig.case.window_s)
         record = vehicle.fly(order, on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
-        outcome, reason, failure = outcome_of(record), record.reason, record.failure
+        outcome, reason, failure = outcome_of(record), record.reason, record.end.failure or ""
     except VehicleError as error:
         reason = str(error)
     rig.states.ended_s, concern = rig.drone.time_s, vehicle.concern

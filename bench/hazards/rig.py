@@ -11,7 +11,8 @@ from app.simdrone.body import new_body
 from app.simdrone.drone import BOOT_S, Drone, Lockstep
 from app.simdrone.motion_capture import VehicleLinkOutput
 from app.simdrone.registry import get_autopilot
-from app.vehicles.base import OptionValue, StopRequest
+from app.vehicles.base import OptionValue
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink_kind import MAVLINK
 from bench.hazards.cases import (
     ABORT,

@@ -13,8 +13,9 @@ from itertools import pairwise, product
 
 import pytest
 
-from app.vehicles.mavlink.records import ending_of, has_flown
-from app.vehicles.mavlink.trial_reactions import TRANSITIONS
+from app.vehicles.flight_end import Landing
+from app.vehicles.mavlink.records import ending_of
+from app.vehicles.mavlink.trial_state import TRANSITIONS
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, judge
 from bench.hazards.hostile_table import HAZARDS
 from bench.hazards.rig import InjectedFault
@@ -136,7 +137,7 @@ def test_a_hazard_has_the_ending_of_its_row_and_no_consequence_that_is_not_permi
     trial = flight.trial
     assert trial.is_over
     reported = ReportedOutcome(
-        outcome=ending_of(trial) if has_flown(trial) else "refused",
+        outcome=ending_of(trial) if trial.contact is not Landing.STAYED else "refused",
         vehicle="quarantined" if trial.state.value == "quarantined" else "safe",
         reason=trial.why,
         concern=trial.why,

@@ -65,7 +65,7 @@ def test_a_zip_of_something_else_is_refused(client: TestClient, database: Databa
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("version", 6), ("version", 0), ("format", "zip"), ("made_at", "yesterday"), ("extra", 1)]
+    ("field", "value"), [("version", 7), ("version", 0), ("format", "zip"), ("made_at", "yesterday"), ("extra", 1)]
 )
 def test_another_format_or_version_is_refused_by_its_field(
     client: TestClient, database: Database, parts: Parts, field: str, value: object

@@ -83,10 +83,19 @@ def as_of_version(version: int, bundle: bytes, *, without: str) -> bytes:
     parts = parts_of(bundle)
     contents, manifest = json.loads(parts["contents.json"]), {**json.loads(parts["manifest.json"]), "version": version}
     values = [each.pop(without) for each in contents["campaigns"][0]["trials"]]
-    named = {each["part"] for each in values if isinstance(each, dict)}
+    named = {each["part"] for each in values if isinstance(each, dict) and "part" in each}
     old = {name: data for name, data in parts.items() if name not in named}
     old |= {"contents.json": json.dumps(contents).encode(), "manifest.json": json.dumps(manifest).encode()}
     return sealed(old)
+
+
+def with_reasons(bundle: bytes, reasons: dict[int, str]) -> bytes:
+    """The bundle with other reasons, by the trials' numbers."""
+    parts = parts_of(bundle)
+    contents = json.loads(parts["contents.json"])
+    for trial in contents["campaigns"][0]["trials"]:
+        trial["reason"] = reasons.get(trial["number"], trial["reason"])
+    return sealed({**parts, "contents.json": json.dumps(contents).encode()})
 
 
 def without(document: Json, names: set[str]) -> Json:
@@ -339,3 +348,25 @@ def test_why_a_flight_was_broken_off_goes_along_and_bundles_from_before_it_was_r
 
     assert causes(brought(there, bundle))[trial["number"] - 1] == "operator"
     assert set(causes(brought(there, as_of_version(1, bundle, without="abort_cause")))) == {None}
+
+
+@pytest.mark.complete
+def test_how_a_flight_ended_is_recognised_in_the_words_of_earlier_bundles(
+    client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, _ = elsewhere
+    trial = fly_trial(
+        client, database, campaign["id"], create_record(ending="aborted", reason="enough", on_request=True)
+    )
+    run_jobs(database)
+    number = trial["number"]
+    earlier = as_of_version(5, download_bundle(client, campaign["id"]), without="end")
+
+    def arrived(reason: str) -> Json:
+        brought_in = brought(there, with_reasons(earlier, {number: reason}))
+        found: Json = get(there, f"/api/campaigns/{brought_in['id']}/trials")["items"][number - 1]
+        return found
+
+    assert arrived("enough")["end"] == trial["end"]
+    limit = arrived("A safety limit was exceeded. It rose to 4.6 m.")
+    assert (limit["end"]["failure"], limit["end"]["request"], limit["given_reason"]) == ("F6", None, "")

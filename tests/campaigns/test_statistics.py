@@ -36,7 +36,7 @@ OTHER = {"kp": 300, "ki": 60, "kd": 80}
 def modelled(gains: Gains) -> FlightRecord:
     """A flight of the twin without scatter."""
     trajectory = TAKEOFF.simulate(TAKEOFF.space.vector(gains), np.array(TWIN))
-    return FlightRecord(trajectory=trajectory, ending="completed", reason="")
+    return FlightRecord(trajectory=trajectory, ending="completed")
 
 
 def fly(client: TestClient, database: Database, campaign_id: int, settling_s: float, **chosen: object) -> int:

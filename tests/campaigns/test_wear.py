@@ -30,7 +30,7 @@ def record(gains: Json, model: Sequence[float], sag_v: float) -> FlightRecord:
     flown = TAKEOFF.simulate(TAKEOFF.space.vector(gains), np.array(model)).as_stored()
     voltage = np.linspace(12.0, 12.0 - sag_v, flown.time_s.size)
     trajectory = Trajectory(flown.time_s, {**flown.channels, "battery_v": voltage}, "test", "vehicle")
-    return FlightRecord(trajectory=trajectory, ending="completed", reason="")
+    return FlightRecord(trajectory=trajectory, ending="completed")
 
 
 def fly_campaign(

@@ -18,7 +18,6 @@ from app.core.formatting import (
     short,
     short_percent,
     signed,
-    without_word,
 )
 
 
@@ -105,11 +104,6 @@ def test_a_whole_gain_is_in_full_and_any_other_has_four_digits() -> None:
     assert [gain(12345.0), gain(-0.123456)] == ["12345", "−0.1235"]
     assert format_gains({"theta_1": -49.4692}) == "theta_1 −49.47"
     assert format_gains({"kp": -50.0, "ki": 1.5}) == "kp −50, ki 1.5"
-
-
-def test_a_reason_does_not_repeat_the_word_of_the_state_before_it() -> None:
-    reasons = ("aborted by the operator", "Aborted", "too high", "abortedly")
-    assert [without_word(reason, "Aborted") for reason in reasons] == ["by the operator", "", "too high", "abortedly"]
 
 
 def test_a_setting_is_printed_as_its_form_shows_it() -> None:

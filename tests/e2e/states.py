@@ -34,11 +34,11 @@ from app.fleet import registration
 from app.fleet.schemas import NewVehicle
 from app.flights import flight_rows
 from app.flights import service as flights
-from app.flights.flight_loop import mark_if_requested
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
 from app.reproductions.registry import get_reproduction
-from app.vehicles.base import FlightOptions, StopRequest
+from app.vehicles.base import FlightOptions
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
 from tests.core.tuning.defined import plan_grid
@@ -110,7 +110,7 @@ class States:
 
     def abort(self, campaign_id: int) -> int:
         """The next proposal, whose flight its operator breaks off in the air; the trial's id."""
-        return self._fly(campaign_id, None, stop=StopRequest("aborted by the operator"))
+        return self._fly(campaign_id, None, stop=StopRequest())
 
     def repeat(self, campaign_id: int) -> int:
         """Fly the best gains again; the trial's id."""
@@ -264,7 +264,6 @@ def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> Non
         record = vehicle.fly(
             order, on_sample=lambda _sample: None, should_stop=lambda: stop if next(seen) > _ASKED_IN_2_S else None
         )
-        record = mark_if_requested(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
     flight_rows.record_outcome(session, task.flight_id, flight_rows.FlightOutcome(record=record, restored=restored))
 

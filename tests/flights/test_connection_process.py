@@ -36,6 +36,7 @@ from app.flights.process_messages import (
     VehicleRequest,
 )
 from app.vehicles.base import Identity
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
@@ -307,7 +308,7 @@ def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
     ordered_s = order_when(rig, line, "PARAM_SET", ordered)
     told = len(rig.heard)
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
-    forwarded = CommandForwarded(ordered.number, ordered.order, ordered.reason, is_awaited=ordered is MOTORS_OFF)
+    forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, is_awaited=ordered is MOTORS_OFF)
     assert forwarded in line.said
     kind = "COMMAND_LONG" if ordered is MOTORS_OFF else "SCRIPT_ITEM"
     assert next(at_s for at_s, message in rig.heard[told:] if message.get_type() == kind) - ordered_s[0] < 0.5
@@ -331,7 +332,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
 ) -> None:
     """Land, and motors off at once after it, which comes while the safe gains are given back; what waits before them in
     the pipe is kept."""
-    line.workers_end.send(CancelFlight(9, "of another flight"))
+    line.workers_end.send(CancelFlight(9, StopRequest("of another flight")))
     line.on_staged = lambda: line.workers_end.send(CancelTakeOff())
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
     process._fly(flight_of(rig, tmp_path))
@@ -344,7 +345,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     assert ("interrupted: land was commanded (it drifts)" in failure.what, failure.unsafe) == (True, False)
     assert SafeGainsRestored(dict(SAFE)) in line.said
     assert not any(isinstance(said, GainsStaged) for said in line.said)
-    assert line.receive() == CancelFlight(9, "of another flight")
+    assert line.receive() == CancelFlight(9, StopRequest("of another flight"))
     assert process._vehicle.read_gains() == SAFE
 
 

@@ -18,6 +18,7 @@ from app.flights.process_messages import FlightFailure, FlightLanded, FlightMess
 from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
 from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
 from tests.clocks import ManualClock
 
@@ -123,7 +124,7 @@ def test_a_reference_that_is_reported_later_begins_a_message_and_is_scored_from_
 def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(flight_process: FlightProcess) -> None:
     def abort(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            flight_process.cancel_flight(1, "too high")
+            flight_process.cancel_flight(1, StopRequest("too high"))
 
     aborted = landed_of(fly(flight_process, flight_of(speed=1.0), abort))
     assert (aborted.ending, aborted.reason) == ("aborted", "too high")
@@ -151,7 +152,7 @@ def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(flig
     for said in flight_process.fly(flight_of(speed=1.0)):
         heard.append(said)
         if isinstance(said, GainsStaged):
-            flight_process.cancel_flight(1, "not today")
+            flight_process.cancel_flight(1, StopRequest("not today"))
             flight_process.take_off()
     aborted = landed_of(heard)
     assert (aborted.ending, aborted.reason) == ("aborted", "not today")

@@ -8,9 +8,12 @@ from fastapi.testclient import TestClient
 from app.common.errors import ConflictError
 from app.core.definition import flight_seed
 from app.db.session import Database
+from app.db.types import FLIGHT_END
 from app.flights import flight_rows
 from app.flights.flight_rows import FlightOutcome
 from app.vehicles.base import FlightRecord
+from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import Failure, FlightEnd, GainsLeft, Landing, Requester, StopRequest
 from tests.builders import (
     claim,
     climb_error,
@@ -105,29 +108,22 @@ def test_an_aborted_flight_keeps_its_record_and_is_history_without_an_error(
     assert get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["kind"] == "start"
 
 
+ON_GROUND = FlightEnd(failure=Failure.OPERATOR, landed=Landing.STAYED)
 BEFORE_LIFT_OFF = [
-    ("aborted by the operator", True, "aborted before lift-off by the operator", "cancelled"),
-    ("somebody walked in", True, "aborted before lift-off: somebody walked in", "cancelled"),
-    ("aborted", True, "aborted before lift-off", "cancelled"),
-    (
-        "The battery voltage was low: 9.0 V.",
-        False,
-        "ended before lift-off: The battery voltage was low: 9.0 V.",
-        "failed",
-    ),
-    ("Gainline was stopped", True, "Gainline was stopped. It restored the safe gains before the takeoff.", "cancelled"),
+    (replace(ON_GROUND, request=StopRequest()), "cancelled"),
+    (replace(ON_GROUND, request=StopRequest("somebody walked in")), "cancelled"),
+    (replace(ON_GROUND, failure=Failure.BATTERY, remarks=("The battery voltage was low: 9.0 V.",)), "failed"),
+    (replace(ON_GROUND, request=StopRequest(by=Requester.PROGRAM_STOPPED)), "cancelled"),
 ]
 
 
-@pytest.mark.parametrize(("reason", "on_request", "problem", "state"), BEFORE_LIFT_OFF)
+@pytest.mark.parametrize(("end", "state"), BEFORE_LIFT_OFF)
 def test_a_trial_whose_vehicle_never_left_the_ground_is_planned_again(
-    client: TestClient, database: Database, reason: str, on_request: bool, problem: str, state: str
+    client: TestClient, database: Database, end: FlightEnd, state: str
 ) -> None:
     campaign = create_ready_campaign(client, database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
-    record = FlightRecord(
-        trajectory=create_climb(until_s=0.0), ending="aborted", reason=reason, on_request=on_request, has_flown=False
-    )
+    record = FlightRecord(trajectory=create_climb(until_s=0.0), ending="aborted", end=end)
     task = lift_off(database)
     with database.write() as session:
         outcome = replace(flight_rows.outcome_of(record), restored=DEFAULT_GAINS)
@@ -135,7 +131,8 @@ def test_a_trial_whose_vehicle_never_left_the_ground_is_planned_again(
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flown_at"], after["record"], after["abort_cause"]) == ("planned", None, None, None)
     assert after["reason"] == after["flight"]["problem"]
-    assert after["reason"].startswith(problem)
+    expected = replace(end, gains_left=GainsLeft.SAFE)
+    assert (FLIGHT_END.validate_python(after["end"]), after["reason"]) == (expected, end_text(expected))
     assert (after["flight"]["state"], after["flight"]["safe_gains_restored"]) == (state, True)
     assert "fly" in after["actions"]
     [summary] = get(client, "/api/campaigns")["items"]

@@ -9,6 +9,7 @@ from app.common.errors import StorageError
 from app.core.records.trajectory import Trajectory
 from app.flights.record_spool import RESERVED_BYTES, Spool
 from app.vehicles.base import FlightRecord
+from app.vehicles.flight_end import Failure, FlightEnd, StopRequest
 
 
 def record() -> FlightRecord:
@@ -18,7 +19,7 @@ def record() -> FlightRecord:
             time_s, {"altitude_m": np.sqrt(np.abs(time_s)), "thrust": np.cos(time_s)}, "twin", "simulation"
         ),
         ending="aborted",
-        reason="Ordered, with an ü.",
+        end=FlightEnd(failure=Failure.OPERATOR, request=StopRequest("Ordered, with an ü.")),
         settings={"scatter": 1.0, "quiet": True},
     )
 
@@ -31,9 +32,9 @@ def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
     assert spool.flight_ids() == [7]
     kept = spool.read(7)
     assert kept.flight_id == 7
-    assert (kept.record.ending, kept.record.reason, kept.record.settings) == (
+    assert (kept.record.ending, kept.record.end, kept.record.settings) == (
         flown.ending,
-        flown.reason,
+        flown.end,
         flown.settings,
     )
     np.testing.assert_array_equal(kept.record.trajectory.time_s, flown.trajectory.time_s)

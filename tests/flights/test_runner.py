@@ -21,6 +21,8 @@ from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
 from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
+from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import StopRequest, withdrawn_by
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.campaigns.trials.states import make_vehicle_real
 from tests.clocks import SimulatedClock
@@ -135,11 +137,11 @@ def test_an_abort_while_the_lift_off_is_stored_is_no_flight(
     client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:
     """Observed defect: it was an aborted flight, landed, whose cause had to be given."""
-    when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, "somebody walked in"))
+    when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, StopRequest("somebody walked in")))
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["flown_at"], ended["record"]) == ("planned", None, None)
-    assert ended["reason"] == ended["flight"]["problem"] == "aborted before lift-off: somebody walked in"
+    assert ended["reason"] == ended["flight"]["problem"] == end_text(withdrawn_by(StopRequest("somebody walked in")))
     assert (ended["flight"]["state"], ended["abort_cause"]) == ("cancelled", None)
     assert [said.phase for said in field.heard if isinstance(said, FlightPhase)] == ["staging", "flying", "ended"]
     assert list((settings.data_dir / "spool").iterdir()) == []
@@ -154,12 +156,14 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
 ) -> None:
     seen: list[bool] = []
 
-    when_changed_to(FlightState.RUNNING, lambda: seen.append(field.abort_registry.abort(trial_id, "changed my mind")))
+    when_changed_to(
+        FlightState.RUNNING, lambda: seen.append(field.abort_registry.abort(trial_id, StopRequest("changed my mind")))
+    )
     field.fly_next()
     assert seen == [True]
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["flight"]["state"]) == ("planned", "cancelled")
-    assert ended["flight"]["problem"] == "changed my mind"
+    assert (ended["flight"]["end"]["failure"], ended["flight"]["end"]["request"]["words"]) == ("F8", "changed my mind")
     assert ended["read_back"] is None, "nothing was sent to the vehicle"
 
 
@@ -300,7 +304,7 @@ class Refusing:
 
     def take_off(self) -> None: ...
     def cancel_take_off(self) -> None: ...
-    def cancel_flight(self, trial_id: int, reason: str) -> None: ...
+    def cancel_flight(self, trial_id: int, request: StopRequest) -> None: ...
     def close(self) -> None: ...
 
 

@@ -15,7 +15,7 @@ from app.common.settings import Settings
 from app.core.records.trajectory import Trajectory
 from app.db.models import FlightRow
 from app.db.session import Database
-from app.db.types import utc_now
+from app.db.types import FLIGHT_END, utc_now
 from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.flight_commands import record_abort
@@ -24,6 +24,8 @@ from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_ad
 from app.live.server import LiveServer
 from app.main import create_app
 from app.vehicles.base import FlightRecord
+from app.vehicles.end_texts import end_text, unstaged_text
+from app.vehicles.flight_end import Failure, FlightEnd, GainsLeft, Landing, Requester, StopRequest, withdrawn_by
 from tests.builders import (
     WORKER,
     Json,
@@ -46,6 +48,8 @@ from tests.fleet.vehicles import (
 )
 from tests.unlocking import HERE, unlock
 from tests.vehicles.mavlink.test_before_lift_off import stopped as stopped_drone
+
+UNSTAGED = FlightEnd(request=StopRequest(), landed=Landing.STAYED)
 
 
 @pytest.fixture(autouse=True)
@@ -105,13 +109,13 @@ def take_off(client: TestClient, staged: Json, headers: dict[str, str]) -> tuple
 
 def unstage_claimed(database: Database, staged: Json) -> None:
     """Its worker restores the safe gains instead of taking off."""
-    outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)
+    outcome = FlightOutcome(withdrawn=True, end=UNSTAGED, restored=DEFAULT_GAINS)
     with database.write() as session:
         flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
 
 
-def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
-    """Whether its worker may take off, and why it is to stand down."""
+def is_wanted(database: Database, staged: Json) -> tuple[bool, FlightOutcome | None]:
+    """Whether its worker may take off, and the outcome if it is to stand down."""
     with database.read() as session:
         flight_id = staged["flight"]["id"]
         return flight_rows.clearance_of(session, flight_id)
@@ -184,7 +188,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     with database.write() as session:
         session.get_one(FlightRow, staged["flight"]["id"]).take_off_at = utc_now() - timedelta(seconds=11)
     why = "the takeoff did not start within 10 s of the operator's request"
-    assert is_wanted(database, staged) == (False, why)
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, problem=why))
     with pytest.raises(ConflictError, match=why), database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
 
@@ -224,12 +228,12 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
     headers = {**OUR_PAGE, **control_header(client, real)}
     answer = client.post(f"/api/trials/{staged['id']}/unstage", headers=headers)
     assert (answer.status_code, answer.json()["state"]) == (202, "staged")
-    assert answer.json()["flight"]["standing_down"] == "unstaged by the operator"
+    assert answer.json()["flight"]["standing_down"] == end_text(UNSTAGED)
     assert answer.json()["actions"] == ["cancel", "abort", "note"]
-    assert is_wanted(database, staged) == (False, "unstaged by the operator")
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, end=UNSTAGED))
     assert take_off(client, staged, headers) == (
         409,
-        f"Flight {staged['number']} is being unstaged: unstaged by the operator.",
+        f"Flight {staged['number']} is being unstaged: {end_text(UNSTAGED)}.",
     )
     unstage_claimed(database, staged)
     after = trial(client, staged)
@@ -238,16 +242,14 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
 
 
 @pytest.mark.complete
-@pytest.mark.parametrize(
-    ("headers", "reason"), [(OUR_PAGE, "unstaged from another browser"), ({}, "unstaged by a script")]
-)
+@pytest.mark.parametrize(("headers", "by"), [(OUR_PAGE, Requester.BROWSER), ({}, Requester.SCRIPT)])
 def test_an_unstaging_by_somebody_else_is_not_recorded_as_the_operators(
-    client: TestClient, real: Json, staged: Json, headers: dict[str, str], reason: str
+    client: TestClient, real: Json, staged: Json, headers: dict[str, str], by: Requester
 ) -> None:
     """Observed defect: everyone may unstage, and it was always “by the operator”."""
     take_control(client, real)
     answer = client.post(f"/api/trials/{staged['id']}/unstage", headers=headers)
-    assert answer.json()["flight"]["standing_down"] == reason
+    assert answer.json()["flight"]["standing_down"] == unstaged_text(by)
 
 
 @pytest.mark.complete
@@ -256,14 +258,14 @@ def test_a_take_off_does_not_pass_an_unstaging(
 ) -> None:
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     client.post(f"/api/trials/{staged['id']}/unstage")
-    with pytest.raises(ConflictError, match="unstaged by a script"), database.write() as session:
+    with pytest.raises(ConflictError, match=unstaged_text(Requester.SCRIPT)), database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
 
 
 @pytest.mark.complete
 def test_a_cancelled_trial_stands_its_vehicle_down(client: TestClient, database: Database, staged: Json) -> None:
     assert client.post(f"/api/trials/{staged['id']}/cancel").status_code == 200
-    assert is_wanted(database, staged) == (False, "the trial is cancelled")
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, problem="the trial is cancelled"))
 
 
 @pytest.mark.complete
@@ -273,7 +275,7 @@ def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     with database.write() as session:
         assert flight_rows.lose_running_flights(session) == []
-    assert is_wanted(database, staged) == (False, "the flight is failed")
+    assert is_wanted(database, staged) == (False, FlightOutcome(withdrawn=True, problem="the flight is failed"))
     after = trial(client, staged)
     assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker stopped before lift-off")
     assert seen(client, real)["state"] == "quarantined"
@@ -464,10 +466,10 @@ def test_the_command_log_says_who_asked_what_of_a_flight(
     flight = f"flight {planned['number']} of {campaign['name']}"
     assert [(act["kind"], act["by"], act["reason"], act["state"], act["problem"]) for act in log[:6]] == [
         ("abort", "", f"{flight}: too close", "done", ""),
-        ("stage", "Ada", flight, "failed", "too close"),
-        ("take-off", "Ada", flight, "failed", "unstaged by the operator"),
+        ("stage", "Ada", flight, "failed", end_text(withdrawn_by(StopRequest("too close")))),
+        ("take-off", "Ada", flight, "failed", end_text(UNSTAGED)),
         ("stage", "Ada", flight, "done", ""),
-        ("unstage", "", f"{flight}: unstaged by a script", "done", ""),
+        ("unstage", "", f"{flight}: {unstaged_text(Requester.SCRIPT)}", "done", ""),
         ("stage", "Ada", flight, "done", ""),
     ]
 
@@ -491,7 +493,7 @@ def test_the_command_log_follows_a_flight(client: TestClient, database: Database
     assert states(2) == [("stage", "done", True), ("take-off", "running", False)]
     with database.write() as session:
         flight_rows.record_lift_off(session, task.flight_id)
-        record_abort(session, planned["id"], "too high")
+        record_abort(session, planned["id"], StopRequest("too high"))
     assert states(2) == [("take-off", "done", True), ("abort", "running", False)]
     with database.write() as session:
         outcome = FlightOutcome(record=create_record(ending="aborted", reason="too high", on_request=True))
@@ -499,30 +501,26 @@ def test_the_command_log_follows_a_flight(client: TestClient, database: Database
     assert states(3) == [("stage", "done", True), ("take-off", "done", True), ("abort", "done", True)]
 
 
-LANDED = "Gainline was stopped. It landed the vehicle and restored the safe gains."
-
-
-def stopped(restored: Json | None = DEFAULT_GAINS, **fields: Any) -> FlightOutcome:
-    record = create_record(ending="aborted", on_request=True, until_s=4.0, **fields)
-    return FlightOutcome(record=record, restored=restored)
+def stopped(
+    by: Requester = Requester.PROGRAM_STOPPED,
+    said: str = "",
+    *,
+    restored: Json | None = DEFAULT_GAINS,
+    remark: str = "",
+) -> FlightOutcome:
+    end = FlightEnd(failure=Failure.OPERATOR, request=StopRequest(said, by=by), remarks=(remark,) if remark else ())
+    return FlightOutcome(record=replace(create_record(ending="aborted", until_s=4.0), end=end), restored=restored)
 
 
 @pytest.mark.complete
 @pytest.mark.parametrize(
-    ("outcome", "reason", "cause"),
+    ("outcome", "gains_left", "cause"),
     [
-        (
-            stopped(reason="Gainline was stopped"),
-            LANDED,
-            "something else",
-        ),
-        (
-            stopped(reason="Gainline was stopped 2 samples jumped and were dropped."),
-            f"{LANDED} 2 samples jumped and were dropped.",
-            "something else",
-        ),
-        (stopped(restored=None, reason="Gainline was stopped"), "Gainline was stopped", "something else"),
-        (stopped(reason="too close"), "too close", "operator"),
+        (stopped(), GainsLeft.SAFE, "something else"),
+        (stopped(remark="2 samples jumped and were dropped."), GainsLeft.SAFE, "something else"),
+        (stopped(restored=None), GainsLeft.UNKNOWN, "something else"),
+        (stopped(restored={"kp": 1}), GainsLeft.OTHER, "something else"),
+        (stopped(Requester.OPERATOR, "too close"), GainsLeft.SAFE, "operator"),
     ],
 )
 def test_a_flight_that_ended_because_gainline_was_stopped_says_so_and_asks_for_no_cause(
@@ -531,7 +529,7 @@ def test_a_flight_that_ended_because_gainline_was_stopped_says_so_and_asks_for_n
     real: Json,
     planned: Json,
     outcome: FlightOutcome,
-    reason: str,
+    gains_left: GainsLeft,
     cause: str,
 ) -> None:
     """Observed defect: “The worker was stopped (SIGTERM).”, and the question why the flight was aborted."""
@@ -542,7 +540,9 @@ def test_a_flight_that_ended_because_gainline_was_stopped_says_so_and_asks_for_n
         flight_rows.record_lift_off(session, task.flight_id)
         flight_rows.record_outcome(session, task.flight_id, outcome)
     flown = trial(client, planned)
-    assert (flown["state"], flown["reason"], flown["abort_cause"]) == ("aborted", reason, cause)
+    end = replace(outcome.ended, gains_left=gains_left)
+    assert (flown["state"], flown["reason"], flown["abort_cause"]) == ("aborted", end_text(end), cause)
+    assert FLIGHT_END.validate_python(flown["end"]) == FLIGHT_END.validate_python(flown["flight"]["end"]) == end
 
 
 SILENT = "No current data has been received from the vehicle for more than 2 s."
@@ -626,7 +626,7 @@ def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_not_said_to_have_land
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     record, _, concern = stopped_drone("paparazzi", 4.0, motors_off=motors_off)
     assert bool(concern) == motors_off
-    outcome = FlightOutcome(record=replace(record, on_request=True), concern=concern)
+    outcome = FlightOutcome(record=record, concern=concern)
     with database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
         flight_rows.record_outcome(session, staged["flight"]["id"], outcome)

@@ -30,8 +30,8 @@ def obeys(pipe: Connection, _call: ConnectionRequest) -> None:
     """Takes every order, but to land when it `drifts`."""
     pipe.send(OPENED)
     while isinstance(ordered := pipe.recv(), VehicleCommand):
-        problem = "it knows no such block" if ordered.reason == "drifts" else ""
-        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.reason, problem))
+        problem = "it knows no such block" if ordered.words == "drifts" else ""
+        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.words, problem))
 
 
 def is_busy(pipe: Connection, _call: ConnectionRequest) -> None:
@@ -39,7 +39,7 @@ def is_busy(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     first, second = pipe.recv(), pipe.recv()
     for ordered in (second, first):
-        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.reason))
+        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.words))
     pipe.recv()
 
 
@@ -54,7 +54,7 @@ def dies_before_it_is_confirmed(pipe: Connection, _call: ConnectionRequest) -> N
     pipe.send(OPENED)
     for is_last in (False, True):
         ordered = pipe.recv()
-        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.reason, is_awaited=True)
+        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, is_awaited=True)
         pipe.send(forwarded)
         if not is_last:
             pipe.send(replace(forwarded, is_awaited=False))
@@ -66,7 +66,7 @@ def goes_on(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     pipe.send(STATUS)
     ordered = pipe.recv()
-    pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.reason))
+    pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.words))
     pipe.send(STATUS)
     pipe.recv()
 

@@ -145,7 +145,7 @@ def test_a_flight_that_outlived_its_web_process_can_still_be_aborted_and_one_who
     assert not is_alive(worker)
     with Serving(tmp_path / "data") as third:
         trial = third.trial(trial_id, "aborted")
-        assert (trial["reason"], trial["abort_cause"]) == ("Gainline was stopped", "something else")
+        assert (trial["end"]["request"]["by"], trial["abort_cause"]) == ("program stopped", "something else")
         assert trial["record"]["samples"] > 0
 
 

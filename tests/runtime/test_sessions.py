@@ -58,7 +58,7 @@ def test_a_real_vehicle_waits_for_its_operator_and_for_a_persons_verdict(serving
         assert serving.trial(trial_id, "staged")["read_back"] == TRIED
         assert vehicle.status(lambda status: status["held"] == TRIED)["armed"] is False
         serving.post(f"/trials/{trial_id}/unstage")
-        assert serving.trial(trial_id, "planned")["flight"]["problem"] == "unstaged by a script"
+        assert serving.trial(trial_id, "planned")["flight"]["end"]["request"]["by"] == "script"
         assert vehicle.in_state("ready")["held"] == SAFE
 
         serving.post(f"/trials/{trial_id}/stage")

@@ -11,7 +11,8 @@ from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest, Vehicle
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, Vehicle
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import VEHICLE_KINDS, open_vehicle
 
 TAKEOFF: Final = Takeoff()

@@ -7,7 +7,8 @@ import pytest
 
 from app.core.errors import GainsError, InputError
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
-from app.vehicles.base import FlightOptions, Sample, StopRequest, Vehicle, VehicleError
+from app.vehicles.base import FlightOptions, Sample, Vehicle, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import VEHICLE_KINDS, open_vehicle
 from tests.clocks import SimulatedClock
 from tests.vehicles.flying import CAN_FLY, PROFILES, Watcher, flown, fly, never, unwatched

@@ -2,7 +2,8 @@
 
 import pytest
 
-from app.vehicles.base import ShouldStop, StopRequest
+from app.vehicles.base import ShouldStop
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
 from app.vehicles.simulated import LISTEN_EVERY_S, Pacer
 from tests.vehicles.flying import CAN_FLY, PROFILES, Watcher, fly, never

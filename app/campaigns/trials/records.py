@@ -25,7 +25,15 @@ from app.campaigns.trials.views import trajectory_view, trial_view
 from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
-from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, CampaignState, Ending, TrialState
+from app.common.states import (
+    CAMPAIGN_ACTIONS,
+    HISTORY_TRIAL_STATES,
+    TRIAL_ACTIONS,
+    AbortCause,
+    CampaignState,
+    Ending,
+    TrialState,
+)
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, count, format_gains
@@ -40,6 +48,7 @@ from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.processes.sandbox import FILE, run_limited
+from app.vehicles.flight_end import FlightEnd, Requester
 
 _SINGLE_PRECISION: Final = 1e-6
 """Logs store gains as single-precision numbers."""
@@ -145,16 +154,16 @@ def capture(
     trajectory: Trajectory,
     *,
     ending: Ending = "completed",
+    end: FlightEnd | None = None,
     reason: str = "",
-    on_request: bool = False,
 ) -> None:
-    """Store a flight's record and classify the flight.
+    """Store a flight's record and classify the flight. `end` is how it ended, if it was flown here; `reason` why the
+    measurement of another is `invalid`.
 
-    An `aborted` flight is classified as that, with its `reason`; others are classified by the program where it may. A
-    flight of a real vehicle stays captured until a person classifies it, with the reason as a suggestion where the
-    measurement is `invalid`. A flight that can be scored but has glitches in its record stays captured too. A flight
-    that was aborted `on_request` counts against its gains only once a person says that the vehicle behaved badly.
-    Raises TrajectoryError when the record cannot be stored.
+    An `aborted` flight is classified as that; others are classified by the program where it may. A flight of a real
+    vehicle stays captured until a person classifies it. A flight that can be scored but has glitches in its record
+    stays captured too. A flight that was aborted on request counts against its gains only once a person says that the
+    vehicle behaved badly. Raises TrajectoryError when the record cannot be stored.
     """
     stored = trajectories.store_trajectory(session, trajectory)
     row.trajectory = stored
@@ -172,19 +181,26 @@ def capture(
         row.overshoot_m = row.overshoot_m or None
     row.curve = judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
-    row.ending = ending
+    row.ending, row.end = ending, end
     if ending == "aborted":
-        row.abort_cause = "operator" if on_request else "limit"
+        row.abort_cause = _abort_cause(end)
     if ending == "aborted" and row.state == TrialState.FLYING:
-        set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
+        set_trial_state(row, TrialState.ABORTED, reason="")
         return
-    set_trial_state(row, TrialState.CAPTURED, reason=reason if ending == "invalid" else "")
+    set_trial_state(row, TrialState.CAPTURED, reason=reason)
     if ending == "aborted":
-        set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
+        set_trial_state(row, TrialState.ABORTED)
         return
     row.error = judged.error  # shown before a person classifies the flight, which scores it again
     if fleet.is_classed_automatically(campaign.vehicle):
-        _classify(row, reason or "the measurement is invalid" if ending == "invalid" else judged.refusal)
+        _classify(row, reason if ending == "invalid" else judged.refusal)
+
+
+def _abort_cause(end: FlightEnd | None) -> AbortCause:
+    """Cause of an abort. If Gainline was stopped, there is nothing to ask the operator."""
+    if end is None or end.request is None:
+        return "limit"
+    return "something else" if end.requested_by is Requester.PROGRAM_STOPPED else "operator"
 
 
 def keep_response(row: TrialRow, response: StepResponse | None) -> None:

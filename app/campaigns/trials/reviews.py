@@ -9,7 +9,7 @@ from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.records import Score, keep_response, score
 from app.campaigns.trials.schemas import AbortJudgement, Classification, Trial
-from app.campaigns.trials.views import trial_view
+from app.campaigns.trials.views import reason_of, trial_view
 from app.common.conflict_checks import check_action, check_transition, check_version
 from app.common.errors import ConflictError, InputError, Problem
 from app.common.states import CAMPAIGN_ACTIONS, TRIAL_ACTIONS, TRIAL_TRANSITIONS, TrialState
@@ -34,7 +34,7 @@ def classify_trial(
         classification.version,
         row.version,
         f"Flight {row.number}",
-        {"outcome": (row.state, outcome), "reason": (row.reason, classification.reason)},
+        {"outcome": (row.state, outcome), "reason": (reason_of(row), classification.reason)},
     )
     check_action(TRIAL_ACTIONS, "classify", row.state, f"Flight {row.number}")
     check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Flight {row.number}")

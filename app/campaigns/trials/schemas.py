@@ -9,6 +9,7 @@ from app.campaigns.schemas import Variant
 from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Schema, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 from app.core.statistics.comparisons import Verdict
+from app.vehicles.flight_end import FlightEnd
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 
@@ -87,9 +88,9 @@ class AbortJudgement(Request):
 
 
 class Abort(Request):
-    """Reason for aborting the flight."""
+    """Reason for aborting the flight; without one it is aborted by the operator."""
 
-    reason: Annotated[str, Field(max_length=500)] = "aborted by the operator"
+    reason: Annotated[str, Field(max_length=500)] = ""
 
 
 class AbortAnswer(Schema):
@@ -116,8 +117,8 @@ class RecordBrief(Schema):
 
 
 class FlightBrief(Schema):
-    """The last flight requested for this trial. `problem` states why it failed. A flight of mode `stage` waits with its
-    gains on the vehicle until its operator requests the takeoff."""
+    """The last flight requested for this trial. `problem` states why it failed, `end` how it ended. A flight of mode
+    `stage` waits with its gains on the vehicle until its operator requests the takeoff."""
 
     id: int
     state: FlightState
@@ -125,6 +126,7 @@ class FlightBrief(Schema):
     take_off_at: Annotated[datetime | None, Field(description="time of the takeoff request")]
     standing_down: Annotated[str, Field(description="why a staged flight was cancelled; empty otherwise")]
     problem: str
+    end: FlightEnd | None
     battery: Annotated[str, Field(description="label of the battery used; empty if not given")]
     battery_v_before: float | None
     battery_v_after: float | None
@@ -197,7 +199,11 @@ class Trial(Schema):
     verdict: Annotated[
         str, Field(description="comparison of the flight with the best before it and with its prediction")
     ]
-    reason: Annotated[str, Field(description="reason for the state; empty if none was given")]
+    reason: Annotated[str, Field(description="reason for the state, for people; empty if there is none")]
+    given_reason: Annotated[
+        str, Field(description="the reason if a person or an import gave it; empty if it follows from `end`")
+    ]
+    end: Annotated[FlightEnd | None, Field(description="how its last flight ended; null before the first")]
     abort_cause: Annotated[
         AbortCause | None,
         Field(

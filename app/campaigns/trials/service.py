@@ -34,6 +34,7 @@ from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.db.trajectories import pack
 from app.fleet import service as fleet
 from app.fleet.control import require_may
+from app.vehicles.flight_end import not_begun
 from app.vehicles.registry import get_kind
 
 
@@ -122,7 +123,7 @@ def cancel_trial(session: Session, trial_id: int) -> Trial:
     check_action(TRIAL_ACTIONS, "cancel", row.state, f"Flight {row.number}")
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")
+        set_flight_state(flight, FlightState.CANCELLED, end=not_begun("the trial was cancelled"))
     set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 

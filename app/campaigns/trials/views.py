@@ -20,7 +20,7 @@ from app.common.schemas import Interval
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
-from app.core.formatting import named_flights, percent, short, without_word
+from app.core.formatting import named_flights, percent, short
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
@@ -28,6 +28,8 @@ from app.core.statistics.comparisons import Group, PooledScatter, compare, group
 from app.core.tuning.predictions import is_informative
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
+from app.vehicles.end_texts import cause_text, end_text, is_worded, unstaged_text
+from app.vehicles.flight_end import Requester
 
 CONFIDENCE: Final = 0.9
 
@@ -150,6 +152,8 @@ def _view(
         flight=_flight(flight),
         speed=flight.speed if flight else None,
         settings=row.settings or {},
+        reason=reason_of(row),
+        given_reason=row.reason,
         actions=_actions(campaign, row, flight, rehearsed),
     )
 
@@ -193,22 +197,28 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
             outcome = f", {_once_more(again)}" if again else f": {compared}"
             return f"{short(row.error)} {unit}{outcome}{_against_prediction(row, field, unit)}."
         case TrialState.ABORTED:
-            return _ended("Aborted", row.reason)
+            return _ended("Aborted", row)
         case TrialState.INVALID:
-            return f"Does not count: {row.reason}"
+            return f"Does not count: {reason_of(row)}"
         case TrialState.LOST:
-            return _ended("Lost", row.reason)
+            return _ended("Lost", row)
         case TrialState.CAPTURED:
-            doubt = f"; the measurement is doubtful: {row.reason}" if row.reason else ""
+            doubt = f"; the measurement is doubtful: {reason_of(row)}" if reason_of(row) else ""
             return f"Landed and recorded{_glitches(row)}{doubt}. Review the flight."
         case _:
             return ""
 
 
-def _ended(word: str, reason: str) -> str:
-    """`Aborted: too high`; `Aborted by the operator` for a reason that begins with the word."""
-    rest = without_word(reason, word)
-    return f"{word}: {rest}" if rest == reason else f"{word} {rest}".rstrip()
+def reason_of(row: TrialRow) -> str:
+    """Reason for the trial's state: of a person or an import, else of the end of its flight."""
+    return row.reason or ("" if row.ending == "completed" else end_text(row.end))
+
+
+def _ended(word: str, row: TrialRow) -> str:
+    """`Aborted: too high`; `Aborted by the operator` for a request without words."""
+    if row.reason or row.end is None or row.end.request is None or is_worded(row.end.request):
+        return f"{word}: {reason_of(row)}"
+    return cause_text(row.end, word)
 
 
 def _once_more(again: Sequence[int]) -> str:
@@ -264,7 +274,8 @@ def _flight(row: FlightRow | None) -> FlightBrief | None:
         return None
     return FlightBrief.view_of(
         row,
-        standing_down=row.stand_down,
+        problem=end_text(row.end),
+        standing_down=unstaged_text(Requester(row.stand_down)) if row.stand_down else "",
         safe_gains_restored=None if row.restored is None else row.restored == row.safe_gains,
     )
 

@@ -214,11 +214,15 @@ def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = Fal
     raise GainsError("The gate refuses these gains.", hint=_hint(gate, is_real), problems=problems_of_gate(gate))
 
 
+_WEIGHT: Final = (NUMBERS, "bounds", "wrapping", "altitude", "divergence", "abort altitude")
+"""Names of checks, the most important first: what cannot be flown, then harm in flight. Others follow."""
+
+
 def problems_of_gate(gate: GateResult) -> tuple[Problem, ...]:
-    """Every refusal with its field: `gains.ki`, or `gains` if no single gain is the cause."""
+    """Every refusal with its field, the most important first: `gains.ki`, or `gains` if no single gain is the cause."""
+    by_weight = sorted(gate.refusals, key=lambda check: (*_WEIGHT, check.name).index(check.name))
     return tuple(
-        Problem(f"gains.{check.gain}" if check.gain else "gains", check.sentence, check.offer)
-        for check in gate.refusals
+        Problem(f"gains.{check.gain}" if check.gain else "gains", check.sentence, check.offer) for check in by_weight
     )
 
 

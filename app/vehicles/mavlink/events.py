@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from app.autopilots.commands import Action, Setting
 from app.autopilots.measurements import DISARMING, CommandReply, Measurement, Parameter, Position
+from app.vehicles.flight_end import StopRequest
 
 
 def confirms_motors_off(measurement: Measurement | None, stop_settings: Collection[str]) -> bool:
@@ -34,16 +35,8 @@ class PacketReceived:
 
 
 @dataclass(frozen=True, slots=True)
-class AbortRequested:
-    reason: str
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class MotorsOffRequested:
-    """Request of a person to stop the motors at any height."""
-
-    reason: str
+class StopRequested:
+    request: StopRequest
     now_s: float
 
 
@@ -102,8 +95,7 @@ class GainsRestored:
 Event = (
     Tick
     | PacketReceived
-    | AbortRequested
-    | MotorsOffRequested
+    | StopRequested
     | SecondaryAltitudeReceived
     | DuplicateVehicleDetected
     | ActionDone

@@ -1,15 +1,17 @@
-"""Failures of a trial: detection, reaction, outcome and message of each; and the limits of a trial.
+"""Failures of a trial: detection, reaction and outcome of each; and the limits of a trial.
 
 The table is ordered by severity: of several failures the first one counts.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal
 
 from app.vehicles.base import ALTITUDE_LIMIT_M
+from app.vehicles.flight_end import Failure, StopRequest
+
+__all__ = ["Failure"]
 
 Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
 """refused: nothing flew. aborted: a safety limit was exceeded, which counts against the gains. invalid: the measurement
@@ -18,125 +20,62 @@ is unusable. quarantine: as invalid, and the vehicle's state is uncertain."""
 Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land", "repeat land", "cease", "note"]
 
 
-class Failure(StrEnum):
-    """Failures by their numbers in docs/real-flight.md."""
-
-    NO_HEARTBEAT = "F1"
-    PARAMETER = "F2"
-    NOT_ARMED = "F3"
-    NO_LIFT_OFF = "F4a"
-    TAKE_OFF_REFUSED = "F4b"
-    LINK = "F5"
-    ENVELOPE = "F6"
-    BATTERY = "F7"
-    OPERATOR = "F8"
-    FROZEN = "F9a"
-    GLITCHES = "F9b"
-    DISAGREEMENT = "F9c"
-    LOST_POSITION = "F9d"
-    SLOW_CLOCK = "F9e"
-    TAKEN_OVER = "F10a"
-    UNEXPECTED = "F10b"
-    INTERRUPTED = "F10c"
-    OWN_LANDING = "F11"
-    DUPLICATE = "F12"
-    FALL = "F13"
-    SET_POINT = "F14a"
-    NOT_SETTLED = "F14b"
-    PAUSED = "F14c"
-
-
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Response to a failure. `detection`: condition of the failure; `reaction`: immediate action; `text`: message to
-    the operator."""
+    """Response to a failure. `detection`: condition of the failure; `reaction`: immediate action."""
 
     detection: str
     reaction: Reaction
     outcome: Outcome
-    text: str
 
 
 RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
     {
-        Failure.NO_HEARTBEAT: Response(
-            "no heartbeat within 5 s", "none", "refused", "No heartbeat was received; nothing was sent."
-        ),
+        Failure.NO_HEARTBEAT: Response("no heartbeat within 5 s", "none", "refused"),
         Failure.PARAMETER: Response(
             "a gain unconfirmed after five attempts, 0.5 s apart, or read back with another value",
             "restore gains",
             "refused",
-            "The vehicle did not confirm its gains; it was not armed.",
         ),
-        Failure.NOT_ARMED: Response(
-            "arming refused, or not armed within 2 s", "disarm", "refused", "The vehicle did not arm."
-        ),
+        Failure.NOT_ARMED: Response("arming refused, or not armed within 2 s", "disarm", "refused"),
         Failure.NO_LIFT_OFF: Response(
-            "still less than 0.15 m above the ground when the lift-off time limit ends",
-            "disarm",
-            "aborted",
-            "The vehicle did not lift off.",
+            "still less than 0.15 m above the ground when the lift-off time limit ends", "disarm", "aborted"
         ),
-        Failure.TAKE_OFF_REFUSED: Response("takeoff refused", "disarm", "refused", "The vehicle did not lift off."),
-        Failure.LINK: Response(
-            "no packet for 1 s, or three heartbeats missed",
-            "repeat land",
-            "invalid",
-            "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe or flight "
-            "plan lands it.",
-        ),
+        Failure.TAKE_OFF_REFUSED: Response("takeoff refused", "disarm", "refused"),
+        Failure.LINK: Response("no packet for 1 s, or three heartbeats missed", "repeat land", "invalid"),
         Failure.ENVELOPE: Response(
             "a limit of altitude, position, speed, lean or oscillation, or the vehicle's own fence",
             "land, gains first",
             "aborted",
-            "A safety limit was exceeded.",
         ),
-        Failure.BATTERY: Response(
-            "below the limit for 1 s, or unknown for 10 s", "land", "invalid", "The battery voltage is low or unknown."
-        ),
-        Failure.OPERATOR: Response("requested by the operator", "land, gains first", "aborted", "Aborted."),
+        Failure.BATTERY: Response("below the limit for 1 s, or unknown for 10 s", "land", "invalid"),
+        Failure.OPERATOR: Response("requested by the operator", "land, gains first", "aborted"),
         Failure.FROZEN: Response(
             "packets arrive, but the vehicle's clock stands still for 0.25 s or jumps by more than 0.3 s, or its "
             "altitude and climb rate stand still for 1 s",
             "land",
             "invalid",
-            "The vehicle's position froze while packets still arrived.",
         ),
         Failure.GLITCHES: Response(
-            "more than three lone samples that jump by 0.3 m or are faster than 6 m/s",
-            "note",
-            "invalid",
-            "Too many samples had to be dropped.",
+            "more than three lone samples that jump by 0.3 m or are faster than 6 m/s", "note", "invalid"
         ),
-        Failure.DISAGREEMENT: Response(
-            "two sources more than 0.3 m apart for 0.3 s", "land", "invalid", "Two sources of altitude disagree."
-        ),
+        Failure.DISAGREEMENT: Response("two sources more than 0.3 m apart for 0.3 s", "land", "invalid"),
         Failure.LOST_POSITION: Response(
             "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
             "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than "
             "1 m, or contradicts the vehicle's landed state",
             "land",
             "invalid",
-            "The vehicle's position was lost.",
         ),
         Failure.SLOW_CLOCK: Response(
-            "the record incomplete 3 s after its end, by the ground's clock",
-            "land",
-            "invalid",
-            "The vehicle's clock is slower than the clock speed in its settings.",
+            "the record incomplete 3 s after its end, by the ground's clock", "land", "invalid"
         ),
-        Failure.TAKEN_OVER: Response(
-            "a manual mode, in heartbeats that agree",
-            "cease",
-            "quarantine",
-            "A pilot took manual control; no further commands were sent.",
-        ),
+        Failure.TAKEN_OVER: Response("a manual mode, in heartbeats that agree", "cease", "quarantine"),
         Failure.UNEXPECTED: Response(
             "another mode or block, a disarming or a reboot that was not commanded, in messages that agree, also when "
             "it is found during the landing",
             "land",
             "quarantine",
-            "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.",
         ),
         Failure.INTERRUPTED: Response(
             "one heartbeat in a manual mode, and the next in another; under ArduCopter and PX4 also a flight that "
@@ -144,43 +83,26 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "gain that changed in flight",
             "note",
             "invalid",
-            "The flight may have been interrupted.",
         ),
         Failure.OWN_LANDING: Response(
-            "a landing that was not commanded: its own failsafe, or an exception of its flight plan",
-            "land",
-            "invalid",
-            "The vehicle began to land by itself.",
+            "a landing that was not commanded: its own failsafe, or an exception of its flight plan", "land", "invalid"
         ),
         Failure.DUPLICATE: Response(
             "repeated sequence numbers with different contents, or two alternating clocks, under one system id",
             "land",
             "quarantine",
-            "Two vehicles use the same system id. Both were commanded to land; their motors were not stopped.",
         ),
-        Failure.FALL: Response(
-            "ground contact at more than 2 m/s",
-            "note",
-            "quarantine",
-            "The vehicle fell.",
-        ),
+        Failure.FALL: Response("ground contact at more than 2 m/s", "note", "quarantine"),
         Failure.SET_POINT: Response(
             "a new set point refused, unconfirmed after three attempts, 0.5 s apart, or more than 1.5 s late",
             "land",
             "invalid",
-            "The vehicle did not confirm a new set point.",
         ),
         Failure.NOT_SETTLED: Response(
-            "not at rest within 0.2 m in the 2 s before the first step",
-            "land, gains first",
-            "invalid",
-            "The steps were not flown.",
+            "not at rest within 0.2 m in the 2 s before the first step", "land, gains first", "invalid"
         ),
         Failure.PAUSED: Response(
-            "no set point sent for 0.5 s to an autopilot that must receive them continuously",
-            "land",
-            "invalid",
-            "The set points paused.",
+            "no set point sent for 0.5 s to an autopilot that must receive them continuously", "land", "invalid"
         ),
     }
 )
@@ -191,12 +113,13 @@ HELP: Final = "fly it manually, or stop its motors"
 NOT_DESCENDING: Final = f"It was commanded to land but was not seen to descend: {HELP}."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
-    """A detected failure with its explanation."""
+    """A detected failure with its explanation, or the request of a person."""
 
     failure: Failure
-    why: str
+    why: str = ""
+    request: StopRequest | None = None
 
 
 GAIN_FAILURES: Final = frozenset(
@@ -270,6 +193,10 @@ class Limits:
     def is_manual(self, mode: str) -> bool:
         """Whether a pilot flies the vehicle in this mode. A mode that is not known is a pilot's."""
         return bool(mode and self.automatic_modes) and mode not in self.automatic_modes
+
+    def named(self, mode: str) -> str:
+        """Return the display name of a mode."""
+        return self.mode_names.get(mode, mode)
 
     def stretched(self, factor: float) -> "Limits":
         """Return the limits with all timeouts for packets multiplied by this factor."""

@@ -17,9 +17,10 @@ from app.autopilots.gains import GainParameter, GainSet, check_gains
 from app.autopilots.measurements import Measurement, Parameter
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch
+from app.vehicles.end_texts import FAILURE_TEXTS
 from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.events import PacketReceived
-from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 
 LIST_ATTEMPTS: Final = 3
@@ -34,7 +35,7 @@ def find_gain_set(radio: AutopilotLink) -> GainSet:
             return gain_set
     tried = ", ".join(gain_set[0].parameter for gain_set in radio.profile.gain_sets)
     raise VehicleError(
-        f"{RESPONSES[Failure.PARAMETER].text} It did not reply to requests for {tried}.",
+        f"{FAILURE_TEXTS[Failure.PARAMETER]} It did not reply to requests for {tried}.",
         hint=f"Check that it runs {radio.profile.title}, and that no other program requests its parameters.",
     )
 
@@ -152,7 +153,7 @@ def _request_parameter(
 
 def _unconfirmed(gain: GainParameter) -> VehicleError:
     return VehicleError(
-        f"{RESPONSES[Failure.PARAMETER].text} {gain.parameter} was requested {ATTEMPTS} times, every "
+        f"{FAILURE_TEXTS[Failure.PARAMETER]} {gain.parameter} was requested {ATTEMPTS} times, every "
         f"{REPLY_TIMEOUT_S:g} s.",
         hint="Check that the vehicle is connected and that its system id and aircraft id are correct.",
     )

@@ -1,5 +1,5 @@
 """Record of a trial: its samples as a trajectory, with both sources of altitude, aligned, if there are two, one of
-which is scored; its ending and the reason.
+which is scored; and how it ended.
 """
 
 import math
@@ -15,10 +15,11 @@ from app.core.formatting import count
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.base import LANDED, Ending, OptionValue
+from app.vehicles.base import Ending, OptionValue
+from app.vehicles.flight_end import FlightEnd, GainsLeft
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.trial_machine import Trial
+from app.vehicles.mavlink.trial_state import State, Trial
 
 Scored = Literal["vehicle", "mocap"]
 """Source of the scored altitude."""
@@ -189,16 +190,6 @@ def _with_references(samples: Sequence[RecordSample], begin_s: float) -> Sequenc
     ]
 
 
-def has_flown(trial: Trial) -> bool:
-    """Whether something was flown, or may have been."""
-    return trial.contact != "stayed"
-
-
-def contact_of(trial: Trial) -> Mapping[str, OptionValue]:
-    """Return what a record states of the landing: nothing after a normal one, otherwise that it was not observed."""
-    return {} if trial.contact in {"stayed", "landed"} else {LANDED: False}
-
-
 def ending_of(trial: Trial) -> Ending:
     """Return the ending of the record, independent of a quarantine of the vehicle."""
     outcome = None if trial.failure is None else RESPONSES[trial.failure].outcome
@@ -217,12 +208,16 @@ def hover_throttle_of(trajectory: Trajectory, *, until_s: float) -> float | None
     return float(throttle[at_rest].mean())
 
 
-def reason_of(trial: Trial) -> str:
-    """Return why the flight ended early or does not count, and remarks on its record."""
-    if trial.failure in {None, Failure.OPERATOR, Failure.BATTERY}:
-        reason = trial.why
-    else:
-        reason = f"{RESPONSES[trial.failure].text} {trial.why}"
-    dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
+def end_of(trial: Trial, *notes: str) -> FlightEnd:
+    """Return how the trial ended, with `notes` on its record. A vehicle that its pilot took over still has the gains of
+    the flight: nothing was sent to it."""
+    dropped = trial.watch.positions.glitches if trial.failure is not Failure.GLITCHES else 0
     flag = f"{count(dropped, 'sample')} jumped and {'was' if dropped == 1 else 'were'} dropped." if dropped else ""
-    return " ".join(part for part in (reason, flag) if part)
+    was_left_alone = trial.failure is Failure.TAKEN_OVER and trial.state is State.QUARANTINE
+    return FlightEnd(
+        failure=trial.failure,
+        request=trial.request,
+        remarks=tuple(filter(None, (*trial.remarks, flag, *notes))),
+        gains_left=GainsLeft.FLIGHT if was_left_alone else GainsLeft.UNKNOWN,
+        landed=trial.contact,
+    )

@@ -10,23 +10,21 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.commands import Action
-from app.autopilots.measurements import Heartbeat, Measurement, Position, TargetAltitude
+from app.autopilots.measurements import Position
 from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
 from app.core.formatting import count
 from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import ActionDone, PerformAction
 from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.monitors.set_points import SetPointChange
 from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_reactions import Plan, SetPointChange, Step, Trial, note
+from app.vehicles.mavlink.trial_state import Plan, Step, Trial
 
 HELD_BEFORE_S: Final = 6.0
 """Time before the first step from which a vehicle holds the first set point by position targets."""
 _OVERDUE: Final = 1.2
 """Share of the permitted delay after which no confirmation is awaited: a refusal, with its reason, comes before."""
-_SAME_M: Final = 0.05
-_ASTRAY_S: Final = 0.3
-"""Time after which it is not a late report of the previous set point, and the next heartbeat is a later one."""
 LEAD_S: Final = 0.02
 """Usual time from the command of a set point to its effect: it is commanded so much before it is due."""
 
@@ -50,35 +48,18 @@ def referred_from_s(plan: Plan) -> float:
 
 def note_settling(trial: Trial, positions: tuple[Position, ...]) -> Trial:
     """Note the positions by which the vehicle is at rest before the first step; none if there is no step."""
-    first_s, start_s = _first_step_s(trial), trial.commanded_boot_s
-    if len(trial.changes) >= trial.plan.first_step or first_s is None or start_s is None:
+    first_s, start_s, seen = _first_step_s(trial), trial.commanded_boot_s, trial.set_points
+    if len(seen.changes) >= trial.plan.first_step or first_s is None or start_s is None:
         return trial
     recent = tuple(each for each in positions if each.time_boot_s - start_s >= first_s - SETTLED_FOR_S)
-    return replace(trial, settling=(*trial.settling, *recent)) if recent else trial
-
-
-def note_target(trial: Trial, measurement: Measurement | None, now_s: float) -> Trial:
-    """Note a vehicle that follows another set point than the one it has confirmed, once a heartbeat reports that it
-    still follows set points: a pilot's mode changes its set point too."""
-    since_s, wanted_m = trial.astray_since_s, trial.plan.limits.set_point_m
-    match measurement:
-        case TargetAltitude(altitude_m=altitude_m):
-            is_known = trial.plan.holds_first and trial.changes and not trial.changes_set_point
-            is_astray = is_known and abs(altitude_m - wanted_m) > _SAME_M
-            return watching.with_changes(trial, astray_since_s=(since_s or now_s) if is_astray else None)
-        case Heartbeat(mode=mode) if since_s is not None and now_s - since_s >= _ASTRAY_S:
-            why = "Its set point was changed by a command that was not Gainline's."
-            follows = mode in trial.plan.following_modes
-            return note(trial, Finding(failure=Failure.INTERRUPTED, why=why)) if follows else trial
-        case _:
-            return trial
+    return replace(trial, set_points=replace(seen, settling=(*seen.settling, *recent))) if recent else trial
 
 
 def is_due(trial: Trial, now_s: float) -> bool:
     """Whether the next set point is to be commanded now. While the vehicle has not confirmed the previous one, none
     is; it holds the first one once its climb is over, but no later than it must be at rest."""
     due_s, first_s = _next_due_s(trial), _first_step_s(trial)
-    if due_s is None or first_s is None or trial.changes_set_point:
+    if due_s is None or first_s is None or trial.set_points.is_changing:
         return False
     elapsed_s = _elapsed_s(trial, now_s)
     waits = is_hold(trial) and _climbs(trial) and elapsed_s < first_s - SETTLED_FOR_S
@@ -87,7 +68,7 @@ def is_due(trial: Trial, now_s: float) -> bool:
 
 def is_hold(trial: Trial) -> bool:
     """Whether the next set point is the first one again."""
-    return trial.plan.holds_first and not trial.changes
+    return trial.plan.holds_first and not trial.set_points.changes
 
 
 def find_unsettled(trial: Trial) -> Finding | None:
@@ -96,11 +77,11 @@ def find_unsettled(trial: Trial) -> Finding | None:
     why: str | None = None
     if is_hold(trial):
         why = "had not ended its climb by itself in time for the first step" if _climbs(trial) else None
-    elif len(trial.changes) + 1 == trial.plan.first_step and first_s is not None and start_s is not None:
-        time_s = np.array([each.time_boot_s - start_s for each in trial.settling])
-        altitude_m = np.array([each.altitude_m - trial.plan.datum_m for each in trial.settling])
+    elif len(trial.set_points.changes) + 1 == trial.plan.first_step and first_s is not None and start_s is not None:
+        time_s = np.array([each.time_boot_s - start_s for each in trial.set_points.settling])
+        altitude_m = np.array([each.altitude_m - trial.plan.datum_m for each in trial.set_points.settling])
         why = unsettled(time_s, altitude_m, first_s, trial.plan.set_points.altitudes_m[0])
-    return None if why is None else Finding(failure=Failure.NOT_SETTLED, why=f"The vehicle {why}.")
+    return None if why is None else Finding(Failure.NOT_SETTLED, f"The vehicle {why}.")
 
 
 def find_overdue(trial: Trial, now_s: float) -> Finding | None:
@@ -113,8 +94,9 @@ def find_overdue(trial: Trial, now_s: float) -> Finding | None:
 
 def find_late(trial: Trial) -> Finding | None:
     """Find that the newest set point took effect late, and not the first one again, which may wait for the climb."""
-    number, plan = len(trial.changes), trial.plan
-    late_s = trial.changes[-1].times_s[-1] - plan.set_points.times_s[number]
+    changes, plan = trial.set_points.changes, trial.plan
+    number = len(changes)
+    late_s = changes[-1].times_s[-1] - plan.set_points.times_s[number]
     if number < plan.first_step or late_s <= plan.limits.late_s:
         return None
     return _not_confirmed(f"A set point took effect {late_s:.1f} s late.")
@@ -122,25 +104,25 @@ def find_late(trial: Trial) -> Finding | None:
 
 def find_missing(trial: Trial) -> Finding | None:
     """Find at the end of the record that not every set point was commanded and confirmed."""
-    missing = len(trial.plan.set_points.times_s) - 1 - len(trial.changes)
+    missing = len(trial.plan.set_points.times_s) - 1 - len(trial.set_points.changes)
     return _not_confirmed(f"The record ended without {count(missing, 'set point')}.") if missing else None
 
 
 def _not_confirmed(why: str) -> Finding:
-    return Finding(failure=Failure.SET_POINT, why=why)
+    return Finding(Failure.SET_POINT, why)
 
 
 def command_next(trial: Trial) -> Step:
     """Command the next set point, to which all limits refer from now on. The first one again changes no limit."""
-    number = len(trial.changes) + 1
+    number, commanded = len(trial.set_points.changes) + 1, replace(trial.set_points, is_changing=True)
     set_point_m = trial.plan.set_points.altitudes_m[number] + trial.plan.datum_m
     if is_hold(trial):
-        return replace(trial, changes_set_point=True), (PerformAction(Action.HOLD, set_point_m),)
+        return replace(trial, set_points=commanded), (PerformAction(Action.HOLD, set_point_m),)
     trial = replace(
         trial,
         plan=trial.plan.with_set_point(set_point_m),
         watch=watching.change_set_point(trial.watch, set_point_m),
-        changes_set_point=True,
+        set_points=commanded,
     )
     acceleration_m_s2 = trial.plan.set_points.acceleration_of(number)
     return trial, (PerformAction(Action.FLY_TO, set_point_m, acceleration_m_s2),)
@@ -154,16 +136,15 @@ def confirm(trial: Trial, done: ActionDone) -> Trial:
     """
     sent_s = done.sent_s or (done.now_s,)
     delay_s = (done.now_s if done.replied_s is None else done.replied_s) - sent_s[-1]
-    altitude_m = trial.plan.set_points.altitudes_m[len(trial.changes) + 1]
+    altitude_m = trial.plan.set_points.altitudes_m[len(trial.set_points.changes) + 1]
     times_s = tuple(_elapsed_s(trial, at_s + delay_s) for at_s in sent_s)
-    changes = (*trial.changes, SetPointChange(altitude_m, times_s))
-    return replace(trial, changes=changes, changes_set_point=False)
+    return replace(trial, set_points=trial.set_points.confirm(SetPointChange(altitude_m, times_s)))
 
 
 def _climbs(trial: Trial) -> bool:
     """Whether the vehicle has not yet entered the mode in which it hovers after the climb, if there is one."""
     limits = trial.plan.limits
-    return bool(limits.hovering_modes) and watching.mode_of(trial.watch, limits) not in limits.hovering_modes
+    return bool(limits.hovering_modes) and trial.watch.modes.agreed not in limits.hovering_modes
 
 
 def _first_step_s(trial: Trial) -> float | None:
@@ -173,12 +154,12 @@ def _first_step_s(trial: Trial) -> float | None:
 
 def _next_step_s(trial: Trial) -> float | None:
     """Time of the next step that is not confirmed, since the takeoff command; None after the last."""
-    return _time_s(trial, max(len(trial.changes) + 1, trial.plan.first_step))
+    return _time_s(trial, max(len(trial.set_points.changes) + 1, trial.plan.first_step))
 
 
 def _next_due_s(trial: Trial) -> float | None:
     """Time of the next set point since the takeoff command; None after the last."""
-    return _time_s(trial, len(trial.changes) + 1)
+    return _time_s(trial, len(trial.set_points.changes) + 1)
 
 
 def _time_s(trial: Trial, number: int) -> float | None:
@@ -189,5 +170,5 @@ def _time_s(trial: Trial, number: int) -> float | None:
 
 def _elapsed_s(trial: Trial, now_s: float) -> float:
     """Vehicle's time since the takeoff command, at a time of the ground's clock."""
-    offset_s, start_s = trial.watch.least_offset_s, trial.commanded_boot_s
+    offset_s, start_s = trial.watch.clock.least_offset_s, trial.commanded_boot_s
     return float("-inf") if offset_s is None or start_s is None else now_s - offset_s - start_s

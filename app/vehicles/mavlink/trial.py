@@ -8,16 +8,14 @@ import numpy as np
 
 from app.autopilots.commands import Action, Outgoing, Target, read_parameter
 from app.autopilots.measurements import Position
-from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
-from app.vehicles.mavlink import observation as watching
+from app.vehicles.base import Sample, ShouldStop, VehicleError
+from app.vehicles.flight_end import Requester, StopRequest
 from app.vehicles.mavlink.events import (
-    AbortRequested,
     ActionRefused,
     Command,
     DuplicateVehicleDetected,
     Event,
     GainsRestored,
-    MotorsOffRequested,
     PacketReceived,
     PerformAction,
     RecordSample,
@@ -26,6 +24,7 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
     SendGain,
     SetPointsPaused,
+    StopRequested,
     Tick,
     WithdrawSetPoint,
 )
@@ -34,8 +33,8 @@ from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
-from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_reactions import LANDING, State
+from app.vehicles.mavlink.trial_machine import advance, begin
+from app.vehicles.mavlink.trial_state import LANDING, Plan, State, Trial
 
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""
@@ -124,7 +123,7 @@ class TrialRunner:
         trial, now_s = self._trial, self._radio.clock.now_s()
         if trial.state not in LANDING or now_s - self._sank_s < NOT_DESCENDING_AFTER_S:
             return ""
-        return NOT_DESCENDING if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m) else ""
+        return NOT_DESCENDING if trial.watch.positions.is_airborne(now_s, trial.plan.ground_m) else ""
 
     def _note_sinking(self) -> None:
         """Note since when the vehicle has not descended by `SINKS_M`."""
@@ -184,8 +183,7 @@ class TrialRunner:
         if self._trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
             self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
-            wanted = MotorsOffRequested if stop.motors_off else AbortRequested
-            self._advance(wanted(stop.reason, self._radio.clock.now_s()))
+            self._advance(StopRequested(stop, self._radio.clock.now_s()))
         now_s = self._radio.clock.now_s()
         self._listens_first = now_s - self._listened_s > STALL_S and not self._listens_first
         if not self._listens_first:
@@ -197,7 +195,7 @@ class TrialRunner:
         stop = self._call_should_stop()
         if self._error is None or (stop is not None and stop.motors_off):
             return stop
-        return StopRequest(_describe_error(self._error))
+        return StopRequest(_describe_error(self._error), by=Requester.INTERNAL_ERROR)
 
     def _call_should_stop(self) -> StopRequest | None:
         try:
@@ -272,7 +270,7 @@ class TrialRunner:
             source = self._radio.profile.reference
             return self._loop.reference_at(source, position.altitude_m, now_s)
         time_s = np.array([position.time_boot_s - trial.commanded_boot_s])
-        flown = at_last_times(trial.plan.takeoff, trial.changes)
+        flown = at_last_times(trial.plan.takeoff, trial.set_points.changes)
         return float(self._reference(flown, time_s)[0]) + trial.plan.datum_m
 
     def _restored(self) -> str:

@@ -82,10 +82,10 @@ export function limitsOf(problem: Problem | null): string[] {
   return [...new Set((problem?.problems ?? []).filter(({ offer }) => offer !== undefined).map(({ reason }) => reason))];
 }
 
-/** The page's words where the API's title is the term of its protocol. */
+/** The page's words where the API's title is the term of its protocol, by the type of the error or its status. */
 const TITLES: Readonly<Record<string, string>> = {
-  Conflict: "Not possible now",
-  "Bad Request": "Unreadable request",
+  "urn:gainline:conflict": "Not possible now",
+  400: "Unreadable request",
 };
 
 /** Convert the response of a failed request to a problem. */
@@ -94,15 +94,14 @@ export function problemFrom(status: number | undefined, body: unknown): Problem 
   const found = (typeof body === "object" && body !== null ? body : {}) as Record<string, unknown>;
   return {
     status,
-    title: titleOf(text(found["title"])) || `The server returned status ${status}.`,
+    title:
+      TITLES[text(found["type"])] ??
+      TITLES[status] ??
+      (text(found["title"]) || `The server returned status ${status}.`),
     detail: text(found["detail"]),
     hint: text(found["hint"]) || (status >= 500 ? "Try again. If it happens again, check the server log." : ""),
     problems: fieldProblems(found["problems"]),
   };
-}
-
-function titleOf(title: string): string {
-  return TITLES[title] ?? title;
 }
 
 function isProblem(error: unknown): error is Problem {
@@ -157,17 +156,9 @@ function joined(one: string, other: string): string {
   return /[.!?]$/.test(one) ? `${one} ${other}` : `${one}; ${other}`;
 }
 
-/** Most important reasons first: a gain out of bounds, then harm in flight, then other limits. */
-const WEIGHT = [/^\S+ must be /, /stuck on the ground/, /wrap/, /ceiling|diverge|rise/];
-
-/** Reasons of a gain refusal, most important first. */
-export function reasonsByWeight(problem: Problem | null): string[] {
-  const rank = (reason: string): number => {
-    const found = WEIGHT.findIndex((words) => words.test(reason));
-    return found === -1 ? WEIGHT.length : found;
-  };
-  const reasons = new Set((problem?.problems ?? []).map(({ reason }) => reason));
-  return [...reasons].sort((one, other) => rank(one) - rank(other));
+/** Reasons of a gain refusal, the most important first, as the server lists them. */
+export function reasonsOf(problem: Problem | null): string[] {
+  return [...new Set((problem?.problems ?? []).map(({ reason }) => reason))];
 }
 
 /** Refused fields that are not among `fields`. */

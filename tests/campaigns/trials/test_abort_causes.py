@@ -1,5 +1,6 @@
 """Why a flight was broken off: a limit counts against its gains, an operator's caution only when they say so."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,8 +8,9 @@ from fastapi.testclient import TestClient
 
 from app.db.models import TrialRow
 from app.db.session import Database
-from app.flights.flight_loop import mark_if_requested
 from app.flights.record_spool import Spool
+from app.vehicles.end_texts import FAILURE_TEXTS
+from app.vehicles.flight_end import Failure, FlightEnd, StopRequest
 from tests.builders import (
     Json,
     create_flown_campaign,
@@ -43,7 +45,7 @@ def trust(client: TestClient, campaign: Json) -> float:
 
 def aborted(client: TestClient, database: Database, campaign: Json, *, on_request: bool) -> Json:
     trial = create_trial(client, campaign["id"], fly={"speed": None})
-    reason = "aborted by the operator" if on_request else "A safety limit was exceeded."
+    reason = "" if on_request else "A safety limit was exceeded."
     land(
         database, lift_off(database), create_record(ending="aborted", reason=reason, until_s=4.0, on_request=on_request)
     )
@@ -96,6 +98,22 @@ def test_saying_that_it_was_something_else_changes_no_proposal(
     trial = aborted(client, database, campaign, on_request=True)
     assert judge(client, trial, "something else") == 200
     assert not proposal(client, campaign)["stale"]
+
+
+@pytest.mark.parametrize(
+    ("request_", "cause"),
+    [(None, "limit"), (StopRequest(FAILURE_TEXTS[Failure.ENVELOPE]), "operator")],
+    ids=["limit", "operator"],
+)
+def test_who_ended_a_flight_follows_from_no_words(
+    client: TestClient, database: Database, campaign: Json, request_: StopRequest | None, cause: str
+) -> None:
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    end = FlightEnd(failure=Failure.ENVELOPE if request_ is None else Failure.OPERATOR, request=request_)
+    record = create_record(ending="aborted", until_s=4.0)
+    land(database, lift_off(database), replace(record, end=end))
+    found = get(client, f"/api/trials/{trial['id']}")
+    assert (found["abort_cause"], found["reason"]) == (cause, FAILURE_TEXTS[Failure.ENVELOPE])
 
 
 def test_an_abort_at_a_limit_always_counts_against_the_gains(
@@ -184,28 +202,8 @@ def test_an_aborted_flight_that_is_marked_invalid_stays_an_abort_in_the_report(
     assert '<td class="text">Aborted</td><td class="text">by the operator</td>' in report
 
 
-@pytest.mark.parametrize(
-    ("ending", "reason", "asked", "on_request"),
-    [
-        ("aborted", "enough", {"enough"}, True),
-        ("aborted", "enough 4 samples jumped and were dropped.", {"enough"}, True),
-        ("aborted", "Motors off was requested: people below.", {"people below"}, True),
-        ("aborted", "Motors off was requested by the operator.", {"requested by the operator"}, True),
-        ("aborted", "A safety limit was exceeded. It rose to 4.6 m.", {"enough"}, False),
-        ("aborted", "A safety limit was exceeded. It rose to 4.6 m. Motors off was requested: hot.", {"hot"}, False),
-        ("invalid", "enough", {"enough"}, False),
-        ("aborted", "A safety limit was exceeded.", set(), False),
-    ],
-)
-def test_a_flight_was_ended_on_request_only_where_no_limit_had_ended_it(
-    ending: str, reason: str, asked: set[str], on_request: bool
-) -> None:
-    record = create_record(ending=ending, reason=reason)  # type: ignore[arg-type]  # one of the three
-    assert mark_if_requested(record, asked).on_request is on_request
-
-
 def test_a_record_that_waits_on_the_disk_keeps_why_it_was_broken_off(tmp_path: Path) -> None:
     spool = Spool(tmp_path)
     spool.reserve(1)
     spool.write(1, create_record(ending="aborted", reason="enough", on_request=True))
-    assert spool.read(1).record.on_request
+    assert spool.read(1).record.end == FlightEnd(failure=Failure.OPERATOR, request=StopRequest("enough"))

@@ -177,9 +177,7 @@ def spiky(climb: Trajectory) -> Trajectory:
 
 def test_a_simulated_flight_with_a_glitch_waits_for_a_person(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=OPEN)
-    fly_trial(
-        client, database, campaign["id"], FlightRecord(trajectory=spiky(create_climb()), ending="completed", reason="")
-    )
+    fly_trial(client, database, campaign["id"], FlightRecord(trajectory=spiky(create_climb()), ending="completed"))
     (trial,) = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     assert trial["state"] == "captured"
     assert trial["error"] == pytest.approx(climb_error(1.0) + 0.5 * 0.1 / 32.6, abs=1e-3)

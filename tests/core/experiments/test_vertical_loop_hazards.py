@@ -28,7 +28,8 @@ from app.core.models.vertical_hazards import (
     report_swings,
 )
 from app.core.policy import Gains
-from app.vehicles.base import FlightOptions, StopRequest
+from app.vehicles.base import FlightOptions
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 

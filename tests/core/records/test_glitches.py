@@ -10,7 +10,8 @@ from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.trajectory import Samples, Trajectory
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.vehicles.base import FlightOptions, OptionValue, StopRequest
+from app.vehicles.base import FlightOptions, OptionValue
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 

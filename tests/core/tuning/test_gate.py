@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from app.core.definition import Definition, Start
 from app.core.errors import GainsError
 from app.core.experiments.base import Check, ParameterDistribution, prior_distribution
-from app.core.tuning.gate import check_policy, check_step, require_flyable
+from app.core.tuning.gate import GateResult, check_policy, check_step, problems_of_gate, require_flyable
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
 
 SPACE = TAKEOFF.space
@@ -195,3 +195,10 @@ def test_the_sentence_says_that_the_step_is_that_to_the_bound() -> None:
     assert check("step", DEFAULT | {"kp": 99999}).sentence.startswith(
         "kp changes most, by 92.9\u00a0% of its range to its bound;"
     )
+
+
+def test_what_cannot_be_flown_is_the_first_problem_then_harm_in_flight_then_the_others() -> None:
+    names = ("step", "altitude", "wrapping", "hover throttle", "bounds")
+    gate = GateResult(tuple(Check(name, False, name, worst=1.0, limit=0.0) for name in names))
+    found = [problem.reason for problem in problems_of_gate(gate)]
+    assert found == ["bounds", "wrapping", "altitude", "step", "hover throttle"]

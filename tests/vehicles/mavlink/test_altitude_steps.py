@@ -10,7 +10,8 @@ from app.autopilots.experiments import get_experiment
 from app.autopilots.simulated.copter_parameters import Parameters
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, VehicleError
+from app.vehicles.flight_end import Failure, Landing, StopRequest
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import compiled_only
@@ -85,10 +86,8 @@ def test_a_set_point_that_is_never_confirmed_ends_the_flight_as_invalid() -> Non
         record = fly(rig)
         assert waypoints(rig) == [3.0, 2.0, 3.0, 3.0, 3.0]
     assert record.ending == "invalid"
-    assert record.reason == (
-        "The vehicle did not confirm a new set point. The vehicle did not reply to the command to fly to its next set "
-        "point."
-    )
+    assert record.end.failure is Failure.SET_POINT
+    assert record.end.remarks == ("The vehicle did not reply to the command to fly to its next set point.",)
     assert "reference_m" not in record.trajectory.channels
     assert record.trajectory["set_point_m"][-1] == pytest.approx(0.1, abs=0.01)
 
@@ -116,8 +115,8 @@ def test_motors_off_during_a_step_stops_it_at_once() -> None:
         stop = lambda: decide() if watcher.samples else None  # noqa: E731
         record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=stop)
         assert waypoints(rig) == [3.0, 2.0]
-    assert (record.ending, record.settings["landed"]) == ("aborted", False)
-    assert record.reason.startswith("Motors off was requested: it burns.")
+    assert (record.ending, record.end.landed) == ("aborted", Landing.FELL)
+    assert (record.end.failure, record.end.request) == (Failure.OPERATOR, StopRequest("it burns", motors_off=True))
 
 
 @pytest.mark.complete
@@ -258,7 +257,7 @@ def test_a_pilot_who_takes_a_px4_over_before_or_as_it_follows_set_points_keeps_i
         modes = [number(message, "param2") for _, message in requests if number(message, "command") == 176]
         vehicle.close()
     assert modes == [4.0, 6.0][: len(faults)], "takeoff, and the offboard mode once"
-    assert "A pilot took manual control" in record.reason
+    assert record.end.failure is Failure.TAKEN_OVER
 
 
 def fly_with_a_stall(name: str, at_s: float, stall_s: float) -> FlightRecord:
@@ -291,7 +290,8 @@ def test_after_a_stall_each_position_has_the_reference_and_the_throttle_received
 def test_a_stall_that_interrupts_the_stream_of_set_points_ends_the_flight_as_invalid() -> None:
     record = fly_with_a_stall("px4", 15.3, 0.7)
     assert record.ending == "invalid"
-    assert record.reason.startswith("The set points paused. Gainline stalled, and sent no set point for 0.")
+    assert record.end.failure is Failure.PAUSED
+    assert record.end.remarks[0].startswith("Gainline stalled, and sent no set point for 0.")
 
 
 def pushes_of(rig: LockstepRig) -> list[tuple[float, float]]:

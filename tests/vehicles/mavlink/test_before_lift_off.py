@@ -6,11 +6,12 @@ import pytest
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Position
-from app.vehicles.base import FlightRecord, StopRequest
-from app.vehicles.mavlink.events import AbortRequested, ActionRefused, MotorsOffRequested, SecondaryAltitudeReceived
+from app.vehicles.base import FlightRecord
+from app.vehicles.flight_end import Landing, StopRequest
+from app.vehicles.mavlink.events import ActionRefused, SecondaryAltitudeReceived, StopRequested
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.records import contact_of, has_flown
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.records import end_of
+from app.vehicles.mavlink.trial_state import State, Trial
 from tests.vehicles.flying import TUNED, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -20,12 +21,16 @@ from tests.vehicles.mavlink.walking import GROUND_M, STEP_S, TrialDriver
 Walk = Callable[[TrialDriver], object]
 
 
+def has_flown(trial: Trial) -> bool:
+    return end_of(trial).landed is not Landing.STAYED
+
+
 def aborted(walk: TrialDriver) -> TrialDriver:
-    return walk.give(AbortRequested("the operator pressed Abort", walk.now_s))
+    return walk.give(StopRequested(StopRequest("the operator pressed Abort"), walk.now_s))
 
 
 def stopped_by_hand(walk: TrialDriver) -> TrialDriver:
-    return walk.give(MotorsOffRequested("it tips over", walk.now_s))
+    return walk.give(StopRequested(StopRequest("it tips over", motors_off=True), walk.now_s))
 
 
 def over(walk: TrialDriver) -> TrialDriver:
@@ -52,14 +57,14 @@ def test_an_abort_before_the_takeoff_command_is_no_flight() -> None:
     walk = TrialDriver()
     walk.armed = True
     walk = over(aborted(walk.pass_s(0.5)))
-    assert (walk.state, walk.trial.contact, walk.trial.commanded_s) == (State.IDLE, "stayed", None)
+    assert (walk.state, walk.trial.contact, walk.trial.takeoff) == (State.IDLE, "stayed", None)
 
 
 def test_a_refused_takeoff_is_no_flight() -> None:
     walk = over(refused(taking_off()))
     assert (walk.state, walk.trial.failure) == (State.IDLE, Failure.TAKE_OFF_REFUSED)
     assert walk.actions[-1] is Action.MOTORS_OFF
-    assert (walk.trial.contact, has_flown(walk.trial), contact_of(walk.trial)) == ("stayed", False, {})
+    assert (walk.trial.contact, has_flown(walk.trial)) == (Landing.STAYED, False)
 
 
 def test_a_packet_out_of_order_changes_nothing() -> None:
@@ -76,7 +81,7 @@ def hops(walk: TrialDriver) -> None:
     walk.climb_rate_m_s = 0.4
     walk.pass_s(0.2)
     walk.climb(-0.4, for_s=0.2)
-    assert not walk.trial.watch.lifted
+    assert not walk.trial.watch.climb.lifted
 
 
 def climbs_at_an_altitude_that_stands_still(walk: TrialDriver) -> None:
@@ -158,7 +163,7 @@ def test_a_vehicle_that_was_above_the_ground_before_the_takeoff_command_has_flow
     walk.climb_rate_m_s = 1.0
     walk = aborted(walk.pass_s(0.5))
     walk.climb_rate_m_s = 0.0
-    assert (walk.trial.commanded_s, walk.trial.watch.lifted) == (None, True)
+    assert (walk.trial.takeoff, walk.trial.watch.climb.lifted) == (None, True)
     walk.touch_down()
     assert has_flown(walk.trial)
 
@@ -178,21 +183,21 @@ def test_a_vehicle_that_changed_its_state_by_itself_has_flown() -> None:
 
 def test_a_record_states_that_the_vehicle_fell() -> None:
     walk = TrialDriver().lift_off()
-    assert contact_of(over(aborted(walk).touch_down()).trial) == {}
+    assert over(aborted(walk).touch_down()).trial.contact is Landing.LANDED
     walk = TrialDriver().lift_off()
-    walk = walk.give(MotorsOffRequested("people below", walk.now_s)).disarm().restore()
-    assert (walk.trial.contact, contact_of(walk.trial)) == ("fell", {"landed": False})
+    walk = walk.give(StopRequested(StopRequest("people below", motors_off=True), walk.now_s)).disarm().restore()
+    assert walk.trial.contact is Landing.FELL
 
 
 def test_a_record_states_that_no_landing_was_observed() -> None:
     walk = aborted(TrialDriver().lift_off()).pass_s(41.0)
-    assert (walk.state, contact_of(walk.trial)) == (State.QUARANTINE, {"landed": False})
+    assert (walk.state, walk.trial.contact) == (State.QUARANTINE, Landing.UNKNOWN)
 
 
 def test_motors_off_on_the_ground_after_a_landing_is_no_fall() -> None:
     walk = aborted(TrialDriver().lift_off()).touch_down()
-    walk = walk.give(MotorsOffRequested("to be sure", walk.now_s)).disarm().restore()
-    assert (walk.trial.contact, contact_of(walk.trial)) == ("landed", {})
+    walk = walk.give(StopRequested(StopRequest("to be sure", motors_off=True), walk.now_s)).disarm().restore()
+    assert walk.trial.contact is Landing.LANDED
 
 
 # ---- the simulated drone

@@ -11,7 +11,8 @@ from pymavlink import mavutil
 
 from app.autopilots.dialects import number
 from app.autopilots.registry import AUTOPILOTS
-from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE

@@ -18,7 +18,8 @@ from app.autopilots.px4.simulated import Px4
 from app.autopilots.simulated.body import OutgoingMessage
 from app.simdrone import faults
 from app.simdrone.faults import Fault, FaultTarget
-from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import STANDSTILL_S, MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from tests.vehicles.flying import never, unwatched

@@ -28,8 +28,3 @@ def test_every_failure_is_described_for_the_operator(failure: Failure) -> None:
     assert RESPONSES[failure].detection in row
     assert RESPONSES[failure].reaction in row or RESPONSES[failure].reaction == "none"
     assert RESPONSES[failure].outcome in row
-
-
-def test_the_fly_screen_knows_the_sentence_of_a_pilot_who_took_over() -> None:
-    screen = Path(__file__).parents[3] / "frontend" / "src" / "features" / "campaign" / "verdict.ts"
-    assert RESPONSES[Failure.TAKEN_OVER].text in screen.read_text(encoding="utf-8")

@@ -6,11 +6,13 @@ import pytest
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import BlockEntered
-from app.vehicles.mavlink.events import AbortRequested, ActionDone, MotorsOffRequested, SecondaryAltitudeReceived
+from app.vehicles.end_texts import FAILURE_TEXTS, request_text
+from app.vehicles.flight_end import GainsLeft, StopRequest
+from app.vehicles.mavlink.events import ActionDone, SecondaryAltitudeReceived, StopRequested
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.records import ending_of
-from app.vehicles.mavlink.trial_reactions import State
-from tests.vehicles.mavlink.test_trial_machine import STAGES
+from app.vehicles.mavlink.records import end_of, ending_of
+from app.vehicles.mavlink.trial_state import State
+from tests.vehicles.mavlink.test_trial_machine import STAGES, fly_too_high
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 TAKE_OFF, STANDBY, LAND_BLOCK = 4, 5, 14
@@ -36,8 +38,11 @@ COPTER = replace(
 )
 
 
-def slide(walk: TrialDriver, reason: str = "it flies towards people") -> TrialDriver:
-    return walk.give(MotorsOffRequested(reason, walk.now_s))
+SLIDE = StopRequest("it flies towards people", motors_off=True)
+
+
+def slide(walk: TrialDriver) -> TrialDriver:
+    return walk.give(StopRequested(SLIDE, walk.now_s))
 
 
 @pytest.mark.parametrize("state", STAGES)
@@ -51,7 +56,7 @@ def test_motors_off_is_sent_at_once_in_every_state_and_aborts_a_trial_that_had_n
     assert walk.state is (State.RESTORE if state is State.RESTORE else State.DISARM)
     expected = failed if failed[0] is not None else (Failure.OPERATOR, "aborted")
     assert (walk.trial.failure, walk.trial.outcome) == expected
-    assert walk.trial.why.endswith("Motors off was requested: it flies towards people.")
+    assert walk.trial.request == SLIDE or walk.trial.remarks[-1] == request_text(SLIDE)
 
 
 def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_says_so() -> None:
@@ -83,11 +88,31 @@ def test_motors_off_that_is_not_obeyed_quarantines_the_vehicle() -> None:
 
 def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -> None:
     walk = STAGES[State.RECORD]()
-    walk.give(AbortRequested("too high", walk.now_s)).pass_s(0.2)
+    walk.give(StopRequested(StopRequest("too high"), walk.now_s)).pass_s(0.2)
     for _ in range(55):
         slide(walk).pass_s(STEP_S)
     assert len(walk.when(Action.KILL)) == 2
-    assert walk.trial.why == "too high Motors off was requested: it flies towards people."
+    assert (walk.trial.request, walk.trial.remarks) == (StopRequest("too high"), (request_text(SLIDE),))
+
+
+@pytest.mark.parametrize("motors_off", [False, True])
+def test_a_limit_has_ended_the_flight_although_its_operator_then_says_the_same(motors_off: bool) -> None:
+    """Observed defect: with these words of the operator the flight did not count against its gains."""
+    walk = STAGES[State.RECORD]()
+    fly_too_high(walk)
+    assert walk.trial.failure is Failure.ENVELOPE
+    walk.give(StopRequested(StopRequest(FAILURE_TEXTS[Failure.ENVELOPE], motors_off=motors_off), walk.now_s))
+    end = end_of(walk.trial)
+    assert (end.failure, end.request, ending_of(walk.trial)) == (Failure.ENVELOPE, None, "aborted")
+    assert len(end.remarks) == (2 if motors_off else 1)
+
+
+def test_a_request_has_ended_the_flight_although_a_limit_is_exceeded_then() -> None:
+    walk, request = STAGES[State.RECORD](), StopRequest("too close")
+    walk.give(StopRequested(request, walk.now_s))
+    fly_too_high(walk)
+    end = end_of(walk.trial)
+    assert (end.failure, end.request, end.gains_left) == (Failure.OPERATOR, request, GainsLeft.UNKNOWN)
 
 
 def test_a_flight_plan_that_lands_at_its_own_altitude_limit_counts_against_the_gains() -> None:
@@ -188,7 +213,7 @@ def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle
 def heartbeat_of_a_pilot(walk: TrialDriver) -> TrialDriver:
     """Until one heartbeat has told of a pilot's mode; the next one is not due yet."""
     walk.mode = "64"
-    while walk.trial.watch.mode != "64":
+    while walk.trial.watch.modes.mode != "64":
         walk.pass_s(STEP_S)
     return walk
 
@@ -216,6 +241,7 @@ def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> Non
     walk.pass_s(2.0)
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
     assert Action.LAND not in walk.actions
+    assert end_of(walk.trial).gains_left is GainsLeft.FLIGHT
 
 
 def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> None:

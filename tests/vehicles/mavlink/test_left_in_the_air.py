@@ -9,7 +9,8 @@ import pytest
 
 from app.autopilots.commands import Action, Target
 from app.autopilots.registry import AUTOPILOTS
-from app.vehicles.base import FlightOptions, Identity, StopRequest
+from app.vehicles.base import FlightOptions, Identity
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, copter_of

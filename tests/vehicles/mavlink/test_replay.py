@@ -25,8 +25,8 @@ from app.vehicles.mavlink.events import (
     Tick,
 )
 from app.vehicles.mavlink.failures import Failure, Limits
-from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_machine import advance, begin
+from app.vehicles.mavlink.trial_state import Plan, State, Trial
 from tests.vehicles.mavlink.replaying import FLOWN, GROUND_STATION, LOGS, Recorded, messages, read, recorded
 
 PAPARAZZI = AUTOPILOTS["paparazzi"]
@@ -134,7 +134,7 @@ def test_a_recorded_trial_goes_through_its_states_without_any_failure(
         State.RESTORE,
         State.IDLE,
     ]
-    assert (flight.trial.failure, flight.trial.watch.glitches) == (None, 0)
+    assert (flight.trial.failure, flight.trial.watch.positions.glitches) == (None, 0)
     assert RestoreGains() in [command for _, command in flight.told]
 
 

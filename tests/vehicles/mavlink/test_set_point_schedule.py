@@ -8,17 +8,18 @@ import pytest
 from app.autopilots.commands import Action
 from app.autopilots.measurements import BlockEntered, Heartbeat, TargetAltitude
 from app.core.models.set_points import SetPoints
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.events import (
     ActionDone,
     ActionRefused,
     Command,
-    MotorsOffRequested,
     PerformAction,
     SetPointsPaused,
+    StopRequested,
     WithdrawSetPoint,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink import test_trial_machine as befall
 from tests.vehicles.mavlink.walking import PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
 
@@ -102,7 +103,7 @@ def climbing() -> Stepping:
 def unconfirmed() -> Stepping:
     """While a set point is under way and may have to be repeated."""
     walk = hovering(6.1, unheard=True)
-    assert walk.trial.changes_set_point
+    assert walk.trial.set_points.is_changing
     return walk
 
 
@@ -124,7 +125,7 @@ def test_each_set_point_is_commanded_by_the_vehicles_clock_and_becomes_that_of_a
     assert walk.trial.plan.limits.set_point_m == 2.0
     due_s = [walk.when(Action.FLY_TO)[place] - walk.when(Action.TAKE_OFF)[0] for place in range(3)]
     assert due_s == pytest.approx([6.0, 9.0, 12.0], abs=0.03)
-    took = walk.trial.changes
+    took = walk.trial.set_points.changes
     assert [change.altitude_m for change in took] == [2.0, 3.0, 2.0]
     assert [change.times_s[0] for change in took] == pytest.approx([at_s + LATENCY_S for at_s in due_s], abs=1e-6)
     kept = {sample.set_point_m for sample in walk.kept if sample.position.time_boot_s > walk.boot_s - 12.0}
@@ -148,7 +149,7 @@ def test_steps_that_overshoot_by_a_third_are_no_oscillation_and_further_crossing
         walk.until_s(due_s + 1.7)
         walk.wanted_m = to_m
     walk.until_s(14.0)
-    assert (walk.state, walk.trial.watch.crossings) == (State.RECORD, 0)
+    assert (walk.state, walk.trial.watch.envelope.crossings) == (State.RECORD, 0)
     walk.until_s(14.0)
     for number in range(6):
         walk.wanted_m = 2.0 + (-0.35 if number % 2 == 0 else 0.35)
@@ -162,7 +163,7 @@ def land_by_itself(walk: TrialDriver) -> None:
 
 
 def stop_the_motors(walk: TrialDriver) -> None:
-    walk.give(MotorsOffRequested("it burns", walk.now_s))
+    walk.give(StopRequested(StopRequest("it burns", motors_off=True), walk.now_s))
 
 
 FAILURES: list[tuple[Callable[[TrialDriver], None], State, Failure]] = [
@@ -275,7 +276,7 @@ def test_a_set_point_whose_message_was_repeated_may_have_taken_effect_at_each_se
     walk = unconfirmed()
     sent_s = walk.commanded_s
     walk.give(ActionDone(Action.FLY_TO, sent_s + 0.6, (sent_s, sent_s + 0.5), sent_s + 0.6))
-    [change] = walk.trial.changes
+    [change] = walk.trial.set_points.changes
     assert change.altitude_m == 2.0
     assert change.times_s == pytest.approx((6.1, 6.6), abs=0.03)
 
@@ -303,7 +304,7 @@ def test_no_set_point_is_commanded_while_a_pilot_may_be_flying() -> None:
 def test_the_takeoff_alone_has_no_further_set_points() -> None:
     walk = TrialDriver().lift_off().pass_s(4.0)
     assert Action.FLY_TO not in walk.actions
-    assert walk.trial.settling == ()
+    assert walk.trial.set_points.settling == ()
 
 
 OFFBOARD, LOITER = "6.0", "4.3"
@@ -344,7 +345,7 @@ def following() -> Stepping:
 
 def test_a_vehicle_holds_its_first_set_point_once_it_hovers_and_before_it_steps() -> None:
     walk = following()
-    assert [change.altitude_m for change in walk.trial.changes] == [3.0]
+    assert [change.altitude_m for change in walk.trial.set_points.changes] == [3.0]
     walk.until_s(14.0)
     assert (walk.state, walk.altitudes) == (State.RECORD, [2.0, 3.0])
 
@@ -381,7 +382,7 @@ def test_a_pilot_who_takes_over_while_it_is_commanded_to_hold_is_not_overridden(
 
 def test_holding_the_first_set_point_again_permits_no_crossing() -> None:
     walk = asked()
-    assert not walk.trial.watch.may_overshoot
+    assert not walk.trial.watch.envelope.may_overshoot
 
 
 def test_the_mode_in_which_it_follows_set_points_is_unexpected_before_the_first() -> None:
@@ -417,7 +418,9 @@ def test_a_set_point_of_another_ground_station_makes_the_flight_invalid_and_a_pi
     for seconds, mode, failure in ((0.2, OFFBOARD, None), (1.2, OFFBOARD, Failure.INTERRUPTED), (0.8, "3.0", None)):
         walk = following()
         walk.mode = mode
-        while walk.trial.astray_since_s is None or walk.now_s - walk.trial.astray_since_s < seconds:
+        while (
+            walk.trial.set_points.astray_since_s is None or walk.now_s - walk.trial.set_points.astray_since_s < seconds
+        ):
             walk.hear(TargetAltitude(2.6))
             walk.pass_s(STEP_S)
         walk.hear(TargetAltitude(3.0))

@@ -14,9 +14,9 @@ from app.vehicles.base import (
     FlightRecord,
     InterruptedByOrderError,
     SafeGainsError,
-    StopRequest,
     VehicleError,
 )
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -114,10 +114,10 @@ def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_s
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
         assert (rig.drone.autopilot.armed, vehicle.has_stopped) == (False, True)
-        stopped = "Motors off was requested: people below. The vehicle confirmed that its motors have stopped."
-        assert re.fullmatch(
-            f"{stopped} The vehicle was 1.[0-9] m above the ground: inspect it before it flies again.", record.reason
-        )
+        assert record.end.request == StopRequest("people below", motors_off=True)
+        stopped, height = record.end.remarks
+        assert stopped == "The vehicle confirmed that its motors have stopped."
+        assert re.fullmatch("The vehicle was 1.[0-9] m above the ground: inspect it before it flies again.", height)
 
 
 @pytest.mark.complete
@@ -139,8 +139,8 @@ def test_motors_off_that_the_vehicle_ignores_is_not_reported_as_done() -> None:
             return StopRequest("people below", motors_off=True) if slid else None
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
-        assert record.reason.startswith("Motors off was requested: people below.")
-        assert "It has not confirmed within 5 s that its motors stopped." in record.reason
+        assert record.end.request == StopRequest("people below", motors_off=True)
+        assert "It has not confirmed within 5 s that its motors stopped." in record.end.remarks
         assert (vehicle.concern != "", vehicle.has_stopped) == (True, False)
         vehicle.attend(40.0)  # and it is told to land on
         assert rig.drone.body.altitude_m < 0.1

@@ -18,10 +18,10 @@ from app.autopilots.measurements import (
     Parameter,
     Position,
 )
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
-    AbortRequested,
     ActionDone,
     ActionRefused,
     DuplicateVehicleDetected,
@@ -30,10 +30,11 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
+    StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.trial_machine import Plan, begin
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_machine import begin
+from app.vehicles.mavlink.trial_state import Plan, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
 
 ABORT = "the operator pressed Abort"
@@ -130,7 +131,7 @@ def test_the_ground_is_where_a_vehicle_stands_whose_altitude_began_anew_as_it_wa
     assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + by_m)
     assert walk.trial.plan.datum_m == walk.trial.plan.ground_m
     assert walk.trial.plan.limits.set_point_m == pytest.approx(PLAN.limits.set_point_m + by_m)
-    assert walk.trial.watch.crossings == 0
+    assert walk.trial.watch.envelope.crossings == 0
     walk.pass_s(1.0)
     assert walk.trial.failure is None, "it is not taken for one in the air"
     walk.climb_rate_m_s = 1.0
@@ -190,7 +191,7 @@ def test_an_abort_before_the_command_stops_motors_where_it_stands_too() -> None:
     walk = armed()
     walk.altitude_m += 0.5
     walk.pass_s(0.4)
-    walk.give(AbortRequested(ABORT, walk.now_s))
+    walk.give(StopRequested(StopRequest(ABORT), walk.now_s))
     assert walk.state is State.DISARM
     walk.pass_s(1.1)
     assert Action.MOTORS_OFF in walk.actions
@@ -276,7 +277,7 @@ def drain(walk: TrialDriver) -> None:
 
 
 def press_abort(walk: TrialDriver) -> None:
-    walk.give(AbortRequested(ABORT, walk.now_s))
+    walk.give(StopRequested(StopRequest(ABORT), walk.now_s))
 
 
 def freeze(walk: TrialDriver) -> None:
@@ -653,9 +654,9 @@ def test_a_record_ends_by_the_grounds_clock_too() -> None:
 @pytest.mark.complete
 def test_a_longer_record_allows_the_clock_the_same_share_of_delay() -> None:
     walk = TrialDriver(plan=replace(PLAN, record_s=60.4)).lift_off()
-    assert walk.trial.commanded_s is not None
+    assert walk.trial.takeoff is not None
     walk.tempo = 0.93
-    walk.pass_s(60.4 + 3.4 - (walk.now_s - walk.trial.commanded_s))
+    walk.pass_s(60.4 + 3.4 - (walk.now_s - walk.trial.takeoff.at_s))
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
     walk.pass_s(1.5)
     assert (walk.state, walk.trial.failure) == (State.LAND, None)

@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_reactions import COMMANDED, OVER, TRANSITIONS, State
+from app.vehicles.mavlink.trial_state import COMMANDED, OVER, TRANSITIONS, State
 from tests.vehicles.mavlink.walking import TrialDriver
 
 
@@ -46,6 +46,6 @@ def test_quarantine_can_be_reached_from_every_state_that_moves_the_vehicle() -> 
 def test_a_successor_has_the_fields_of_its_trial_and_no_others() -> None:
     trial = TrialDriver().trial
     misspelt: dict[str, Any] = {"wy": "it drifts"}
-    assert replace(trial, why="it drifts").why == "it drifts"
+    assert replace(trial, remarks=("it drifts",)).why == "it drifts"
     with pytest.raises(TypeError, match="Trial has no wy"):
         replace(trial, **misspelt)

@@ -13,9 +13,9 @@ from app.vehicles.base import (
     OptionValue,
     SafeGainsError,
     Sample,
-    StopRequest,
     VehicleError,
 )
+from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle

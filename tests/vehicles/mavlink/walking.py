@@ -32,8 +32,8 @@ from app.vehicles.mavlink.events import (
     Tick,
 )
 from app.vehicles.mavlink.failures import Limits
-from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_machine import advance, begin
+from app.vehicles.mavlink.trial_state import Plan, State, Trial
 
 GROUND_M = 0.1
 STEP_S = 0.02

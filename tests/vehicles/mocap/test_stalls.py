@@ -5,7 +5,7 @@ import numpy as np
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.events import PacketReceived, SecondaryAltitudeReceived
 from app.vehicles.mavlink.trial import in_order
-from app.vehicles.mavlink.trial_reactions import State
+from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink.walking import TrialDriver
 
 

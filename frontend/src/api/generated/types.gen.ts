@@ -7,7 +7,7 @@ export type ClientOptions = {
 /**
  * Abort
  *
- * Reason for aborting the flight.
+ * Reason for aborting the flight; without one it is aborted by the operator.
  */
 export type Abort = {
     /**
@@ -1332,6 +1332,13 @@ export type Explanation = {
 };
 
 /**
+ * Failure
+ *
+ * Failures by their numbers in docs/real-flight.md.
+ */
+export type Failure = 'F1' | 'F2' | 'F3' | 'F4a' | 'F4b' | 'F5' | 'F6' | 'F7' | 'F8' | 'F9a' | 'F9b' | 'F9c' | 'F9d' | 'F9e' | 'F10a' | 'F10b' | 'F10c' | 'F11' | 'F12' | 'F13' | 'F14a' | 'F14b' | 'F14c';
+
+/**
  * FigureCard
  *
  * A figure, or why there is none: `waiting` for data, or `failed`. `summary` describes it in a sentence.
@@ -1515,8 +1522,8 @@ export type FittedValue = {
 /**
  * FlightBrief
  *
- * The last flight requested for this trial. `problem` states why it failed. A flight of mode `stage` waits with its
- * gains on the vehicle until its operator requests the takeoff.
+ * The last flight requested for this trial. `problem` states why it failed, `end` how it ended. A flight of mode
+ * `stage` waits with its gains on the vehicle until its operator requests the takeoff.
  */
 export type FlightBrief = {
     /**
@@ -1544,6 +1551,7 @@ export type FlightBrief = {
      * Problem
      */
     problem: string;
+    end: FlightEnd | null;
     /**
      * Battery
      *
@@ -1667,6 +1675,23 @@ export type FlightDifference = {
      * Changes
      */
     changes: Array<number | number | null>;
+};
+
+/**
+ * FlightEnd
+ *
+ * How a flight ended. `failure` is the first one; `request` is what ended the flight, before any limit did, or kept
+ * it on the ground. `remarks` are explanations, for people only.
+ */
+export type FlightEnd = {
+    failure?: Failure | null;
+    request?: StopRequest | null;
+    /**
+     * Remarks
+     */
+    remarks?: Array<string>;
+    gains_left?: GainsLeft;
+    landed?: Landing;
 };
 
 /**
@@ -1954,6 +1979,14 @@ export type GainsInTakeoff = {
      */
     refusal: string;
 };
+
+/**
+ * GainsLeft
+ *
+ * Gains that a flight left on its vehicle: the safe gains, read back; others, read back; the flight's own, because
+ * nothing was sent to a vehicle that its pilot took over; or unknown ones.
+ */
+export type GainsLeft = 'safe' | 'other' | 'flight' | 'unknown';
 
 /**
  * GainsPrediction
@@ -2367,6 +2400,14 @@ export type LadderStep = {
      */
     clipped?: Array<string>;
 };
+
+/**
+ * Landing
+ *
+ * Contact of a vehicle with the ground at the end. stayed: it has certainly never left it. fell: its motors were
+ * stopped, or it hit the ground. unknown: its motors were not seen to stop.
+ */
+export type Landing = 'stayed' | 'landed' | 'fell' | 'unknown';
 
 /**
  * LatestRun
@@ -3372,6 +3413,13 @@ export type ReproductionSummary = {
 };
 
 /**
+ * Requester
+ *
+ * Who asked that a flight ends, or does not take place: a person, a script, or a part of this program.
+ */
+export type Requester = 'operator' | 'another browser' | 'another device' | 'script' | 'program stopped' | 'worker exited' | 'internal error';
+
+/**
  * Retune
  *
  * Whether the vehicle should be tuned again; `since` is the flight after which it was last tuned.
@@ -3480,6 +3528,24 @@ export type StartOutput = {
     } | null;
     donor: DonorOutput | null;
     log: LogEvidence | null;
+};
+
+/**
+ * StopRequest
+ *
+ * Request to end a flight early, with the words of who asked, if any. `motors_off` stops the motors at once, at any
+ * height; otherwise the vehicle lands.
+ */
+export type StopRequest = {
+    /**
+     * Words
+     */
+    words?: string;
+    /**
+     * Motors Off
+     */
+    motors_off?: boolean;
+    by?: Requester;
 };
 
 /**
@@ -3926,9 +3992,19 @@ export type Trial = {
     /**
      * Reason
      *
-     * reason for the state; empty if none was given
+     * reason for the state, for people; empty if there is none
      */
     reason: string;
+    /**
+     * Given Reason
+     *
+     * the reason if a person or an import gave it; empty if it follows from `end`
+     */
+    given_reason: string;
+    /**
+     * how its last flight ended; null before the first
+     */
+    end: FlightEnd | null;
     /**
      * Abort Cause
      *
@@ -4514,7 +4590,7 @@ export type VehicleKindInfo = {
 /**
  * VehicleOrder
  *
- * Reason for landing the vehicle, or stopping its motors, now.
+ * Reason for landing the vehicle, or stopping its motors, now; without one, it is the operator's request.
  */
 export type VehicleOrder = {
     /**

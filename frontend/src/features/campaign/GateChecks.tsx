@@ -1,7 +1,7 @@
 import { Button } from "@mantine/core";
 import { IconCircleCheck, IconCircleX } from "@tabler/icons-react";
 import { Fragment } from "react";
-import { limitsOf, type Problem, reasonsByWeight } from "../../api/problems";
+import { limitsOf, type Problem, reasonsOf } from "../../api/problems";
 import type { Check, Gate } from "../../api/types";
 import { count, gainText } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
@@ -77,7 +77,7 @@ interface RefusalProps {
 
 /** Main reason of a refusal and values that would pass; other failed checks are collapsed. */
 export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
-  const [first, ...reasons] = reasonsByWeight(problem);
+  const [first, ...reasons] = reasonsOf(problem);
   const limits = limitsOf(problem);
   const besides = limits.filter((limit) => limit !== first);
   const others = reasons.filter((reason) => !limits.includes(reason));

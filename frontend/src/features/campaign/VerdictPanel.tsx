@@ -114,9 +114,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Text>
       )}
       {!isScored(trial) && <p className={classes["sentence"]}>{asSentence(sentenceOf(trial))}</p>}
-      {trial.verdict && trial.reason && !trial.verdict.toLowerCase().includes(trial.reason.toLowerCase()) && (
-        <p className={classes["reason"]}>{asSentence(trial.reason)}</p>
-      )}
+      {isScored(trial) && trial.reason && <p className={classes["reason"]}>{asSentence(trial.reason)}</p>}
       <AbortCause trial={trial} />
       <TrialComparisons trial={trial} best={bestBeforeTitle(trial, trials).toLowerCase()} unit={unit} />
       {trial.overrule_reason && (

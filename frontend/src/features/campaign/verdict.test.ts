@@ -11,6 +11,7 @@ import {
   consequenceOf,
   endingOf,
   heldGainsNotice,
+  isToldByVehicle,
   isWithdrawnByOperator,
   leftGainsText,
   marksOf,
@@ -221,18 +222,27 @@ test("a scatter without a repeated gain set is named as the prior's", () => {
 });
 
 test("a flight that the operator unstaged did not fail", () => {
-  const flight = (state: string, problem: string) => ({ flight: { id: 1, state, problem } }) as Trial;
-  expect(isWithdrawnByOperator(flight("cancelled", "unstaged by the operator"))).toBe(true);
-  expect(isWithdrawnByOperator(flight("cancelled", "it could not be started within 10 s"))).toBe(false);
-  expect(isWithdrawnByOperator(flight("failed", "The vehicle did not arm."))).toBe(false);
+  const flight = (state: string, by?: string) =>
+    ({ flight: { id: 1, state, end: { request: by === undefined ? null : { by } } } }) as Trial;
+  expect(isWithdrawnByOperator(flight("cancelled", "operator"))).toBe(true);
+  expect(isWithdrawnByOperator(flight("cancelled", "another browser"))).toBe(false);
+  expect(isWithdrawnByOperator(flight("cancelled"))).toBe(false);
+  expect(isWithdrawnByOperator(flight("failed"))).toBe(false);
   expect(isWithdrawnByOperator({ flight: null })).toBe(false);
 });
 
 test("a flight that a pilot took over left its own gains on the vehicle", () => {
-  const restored = (safe_gains_restored: boolean | null) => ({ safe_gains_restored });
-  expect(
-    leftGainsText(restored(null), "A pilot took manual control; no further commands were sent. Mode 0."),
-  ).toContain("left with the flight's gains");
-  expect(leftGainsText(restored(null), "The link was lost in flight.")).toContain("not known");
-  expect(leftGainsText(restored(false), "")).toContain("not on the vehicle");
+  const left = (gains_left: "safe" | "other" | "flight" | "unknown") => leftGainsText({ end: { gains_left } });
+  expect(left("flight")).toContain("left with the flight's gains");
+  expect(left("unknown")).toContain("not known");
+  expect(left("other")).toContain("not on the vehicle");
+  expect(leftGainsText({ end: null })).toContain("not known");
+});
+
+test("how a flight ended is not repeated beside the quarantine that it led to", () => {
+  const trial = (failure: "F6" | "F8", given_reason = "") => ({ given_reason, end: { failure } });
+  expect(isToldByVehicle(trial("F8"), { state: "quarantined" })).toBe(true);
+  expect(isToldByVehicle(trial("F8"), { state: "ready" })).toBe(false);
+  expect(isToldByVehicle(trial("F8", "gust"), { state: "quarantined" })).toBe(false);
+  expect(isToldByVehicle(trial("F6"), { state: "quarantined" })).toBe(false);
 });

@@ -86,7 +86,7 @@ export function sentenceOf(trial: Trial): string {
 
 /** Whether the operator withdrew the last flight before it took off, as by unstaging. */
 export function isWithdrawnByOperator({ flight }: Pick<Trial, "flight">): boolean {
-  return flight !== null && flight.state === "cancelled" && flight.problem.endsWith("by the operator");
+  return flight !== null && flight.state === "cancelled" && flight.end?.request?.by === "operator";
 }
 
 type AbortWord = "behaved badly" | "something else";
@@ -234,19 +234,30 @@ export function heldGainsNotice({
   return `${name} ${reading}. ${safeGainsWritten({ state, identity })}`;
 }
 
-/** How a reason begins if a pilot took over before Gainline had sent anything but the takeoff. */
-const TAKEN_OVER = "A pilot took manual control; no further commands were sent.";
+const LEFT = {
+  other: "The safe gains are not on the vehicle. Inspect it before the next flight.",
+  flight:
+    "The safe gains were not restored, because a pilot took control: the vehicle was left with the flight's gains. Once it has landed and its motors have stopped, restore them on the vehicle's page.",
+  unknown: "It is not known whether the safe gains were restored. Inspect the vehicle before the next flight.",
+} as const;
 
 /** Which gains a flight left on the vehicle whose safe gains were not read back after it. */
-export function leftGainsText(
-  flight: Pick<NonNullable<Trial["flight"]>, "safe_gains_restored">,
-  reason: string,
-): string {
-  if (flight.safe_gains_restored === false)
-    return "The safe gains are not on the vehicle. Inspect it before the next flight.";
-  return reason.startsWith(TAKEN_OVER)
-    ? "The safe gains were not restored, because a pilot took control: the vehicle was left with the flight's gains. Once it has landed and its motors have stopped, restore them on the vehicle's page."
-    : "It is not known whether the safe gains were restored. Inspect the vehicle before the next flight.";
+export function leftGainsText({ end }: Pick<NonNullable<Trial["flight"]>, "end">): string {
+  const left = end?.gains_left ?? "unknown";
+  return LEFT[left === "safe" ? "unknown" : left];
+}
+
+/** Failures without a sentence of their own: what a quarantined vehicle says is the whole reason. */
+const EXPLAINED_BY_REMARKS: readonly string[] = ["F7", "F8"];
+
+/** Whether the vehicle's reason of quarantine is that of the flight's end too. */
+export function isToldByVehicle(
+  trial: Pick<Trial, "given_reason" | "end">,
+  { state }: Pick<Vehicle, "state">,
+): boolean {
+  return (
+    state === "quarantined" && trial.given_reason === "" && EXPLAINED_BY_REMARKS.includes(trial.end?.failure ?? "")
+  );
 }
 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];

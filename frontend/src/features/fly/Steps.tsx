@@ -21,7 +21,7 @@ import { FlightProblem } from "../campaign/FlightProblem";
 import { AbortCause, FlightReview } from "../campaign/FlightReview";
 import { speedOf, wantsRehearsal } from "../campaign/nextStep";
 import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
-import { leftGainsText, sentenceOf } from "../campaign/verdict";
+import { isToldByVehicle, leftGainsText, sentenceOf } from "../campaign/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
 import { areReadBackSince, type FlyStep } from "./flyScreen";
@@ -72,7 +72,7 @@ export function LinkedSteps({
       return (
         <>
           <SafeGainsResult trial={trial} vehicle={vehicle} />
-          <FlightReviewCard campaign={campaign} trial={trial} said={vehicle.concern} />
+          <FlightReviewCard campaign={campaign} trial={trial} isTold={isToldByVehicle(trial, vehicle)} />
         </>
       );
   }
@@ -95,7 +95,7 @@ function SafeGainsResult({ trial, vehicle }: { trial: Trial; vehicle: Vehicle })
   }
   return (
     <p role="alert" className={classes["checks"]}>
-      {leftGainsText(flight, trial.reason)}
+      {leftGainsText(flight)}
     </p>
   );
 }
@@ -298,12 +298,12 @@ function PreflightChecks({ checks }: { checks: readonly VehicleCheck[] }) {
 interface FlightReviewCardProps {
   campaign: Campaign;
   trial: Trial;
-  /** What the page says about the vehicle elsewhere: it is not repeated. */
-  said?: string;
+  /** Whether the page tells elsewhere how the flight ended: it is not repeated. */
+  isTold?: boolean;
 }
 
 /** Result of the flight, its review, and the link to the next flight. */
-function FlightReviewCard({ campaign, trial, said = "" }: FlightReviewCardProps) {
+function FlightReviewCard({ campaign, trial, isTold = false }: FlightReviewCardProps) {
   const trials = useTrials(campaign.id).data ?? [];
   const watching = useReadOnlyReason(campaign.vehicle);
   const page = `/campaigns/${campaign.id}`;
@@ -314,9 +314,7 @@ function FlightReviewCard({ campaign, trial, said = "" }: FlightReviewCardProps)
         <PredictionResult trial={trial} />
         <FlightMarkers trial={trial} />
       </p>
-      {trial.state !== "captured" && !(trial.reason !== "" && said.includes(trial.reason)) && (
-        <p className={classes["say"]}>{asSentence(sentenceOf(trial))}</p>
-      )}
+      {trial.state !== "captured" && !isTold && <p className={classes["say"]}>{asSentence(sentenceOf(trial))}</p>}
       {watching === null && (
         <>
           <AbortCause trial={trial} />

@@ -22,6 +22,7 @@ const flight: Flight = {
   take_off_at: null,
   standing_down: "",
   problem: "",
+  end: null,
   battery: "",
   battery_v_before: null,
   battery_v_after: null,

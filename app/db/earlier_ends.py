@@ -1,0 +1,98 @@
+"""Ends of flights in the words of earlier versions, for the migration to revision 0010 and bundles before version 6.
+
+Nothing else reads words. What is not recognised stays as it was.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+from app.vehicles.end_texts import FAILURE_TEXTS
+
+_FAILURES: Final[Mapping[str, str]] = {
+    **{text: failure.value for failure, text in reversed([*FAILURE_TEXTS.items()])},
+    "A safety limit was met.": "F6",
+    "A person may have flown the vehicle for a moment.": "F10c",
+    "Somebody took the vehicle over by hand; it was left alone.": "F10a",
+    "The link was lost in the air; Land was repeated, the vehicle's own failsafe decides.": "F5",
+    "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.": "F10b",
+    "The vehicle would not arm.": "F3",
+    "The vehicle's clock goes slower than its clock_speed says.": "F9e",
+    "The vehicle's position stood still while it went on talking.": "F9a",
+    "Two vehicles speak under one system id; both were told to land, and no motors were stopped.": "F12",
+}
+"""How a reason begins, and the number of its failure, the first if several have the sentence: in the words of 0.3.0,
+which are today's, and of 0.2.0. A sentence that is changed is added as it was."""
+ORIGINS: Final[Mapping[str, str]] = {
+    "unstaged by the operator": "operator",
+    "unstaged from another browser": "another browser",
+    "unstaged from another device": "another device",
+    "unstaged by a script": "script",
+}
+_TAKEN_OVER: Final = "F10a"
+_ON_GROUND: Final = re.compile(r"(aborted|ended) before lift-off:? ?")
+_PROGRAM: Final = re.compile(r"(?:Gainline was stopped|the worker was stopped \(SIG[A-Z0-9]+\))\.? ?")
+_RESTORED: Final = re.compile(
+    r"(?:It landed the vehicle and restored the safe gains\.|It restored the safe gains before the takeoff\. "
+    r"Request the flight again if it is still needed\.) ?"
+)
+_MOTORS_OFF: Final = re.compile(
+    r"Motors off was (?:(?:requested by|asked for: asked for by) the operator|(?:requested|asked for): (?P<words>.+?))"
+    r"\.(?: |$)"
+)
+_BY_OPERATOR: Final = re.compile(r"(?:aborted )?by the operator(?:\. | |$)")
+_REQUESTED: Final = frozenset({"operator", "behaved badly", "something else"})
+"""Causes of an abort that a person requested."""
+
+
+def read_end(text: str, *, on_request: bool = False, landed: str = "landed", gains_left: str = "unknown") -> Any:
+    """Return the end of a flight as it is stored now. `on_request`: it is known that a person ended it."""
+    failure, request, rest = None, None, text
+    if (found := _ON_GROUND.match(rest)) is not None:
+        landed, on_request, rest = "stayed", on_request or found[1] == "aborted", rest[found.end() :]
+    if rest in ORIGINS:
+        landed, request, rest = "stayed", _request(by=ORIGINS[rest]), ""
+    elif (found := _PROGRAM.match(rest)) is not None:
+        failure, request, rest = "F8", _request(by="program stopped"), rest[found.end() :]
+        if (known := _RESTORED.match(rest)) is not None:
+            gains_left, rest = "safe", rest[known.end() :]
+    elif (found := _MOTORS_OFF.match(rest)) is not None:
+        failure, request, rest = "F8", _request(found["words"] or "", motors_off=True), rest[found.end() :]
+    elif (found := _BY_OPERATOR.match(rest)) is not None:
+        failure, request, rest = "F8", _request(), rest[found.end() :]
+    elif (begin := next((begin for begin in _FAILURES if rest.startswith(begin)), None)) is not None:
+        failure, rest = _FAILURES[begin], rest.removeprefix(begin).lstrip()
+    elif on_request:
+        failure, request, rest = "F8", _request(rest), ""
+    return {
+        "failure": failure,
+        "request": request,
+        "remarks": [rest] if rest else [],
+        "gains_left": "flight" if failure == _TAKEN_OVER and gains_left == "unknown" else gains_left,
+        "landed": landed,
+    }
+
+
+def _request(words: str = "", *, by: str = "operator", motors_off: bool = False) -> dict[str, object]:
+    return {"words": words, "motors_off": motors_off, "by": by}
+
+
+def is_recognised(end: Mapping[str, Any]) -> bool:
+    return end["failure"] is not None or end["request"] is not None
+
+
+def landing_of(settings: Mapping[str, Any]) -> str:
+    """Earlier versions noted among the settings that a landing was not observed."""
+    return "landed" if settings.get("landed", True) else "unknown"
+
+
+def give_end(trial: dict[str, Any]) -> None:
+    """Give a trial of an earlier version, without the flight that was its last, the end that its reason tells. A reason
+    that is not recognised stays, because a person may have given it."""
+    landed = landing_of(trial["settings"])
+    on_request = trial["state"] == "aborted" and trial.get("abort_cause") in _REQUESTED
+    end = read_end("" if trial["state"] == "valid" else trial["reason"], on_request=on_request, landed=landed)
+    if is_recognised(end):
+        trial["end"], trial["reason"] = end, ""
+    elif landed != "landed":
+        trial["end"] = end | {"remarks": []}

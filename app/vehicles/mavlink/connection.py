@@ -1,0 +1,286 @@
+"""Connection to a vehicle with a MAVLink autopilot: its opening, safe gains, preflight checks and release."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from app.autopilots.commands import Action
+from app.core.clock import Clock
+from app.core.policy import Gains
+from app.vehicles.base import CheckItem, Identity, SafeGainsError, VehicleError
+from app.vehicles.kinds import Options
+from app.vehicles.mavlink import addresses, ground_observation, preflight, preparation
+from app.vehicles.mavlink.altitude_sources import AltitudeSource
+from app.vehicles.mavlink.failures import HELP
+from app.vehicles.mavlink.ground_observation import WATCHED_S, GroundObservation
+from app.vehicles.mavlink.observed_vehicle import LISTEN_S, ObservedVehicle
+from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
+from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.transports import Transport
+from app.vehicles.mavlink.trial_state import State
+
+_FURTHER_OBSERVATIONS: Final = 3
+"""Greatest number of further observations of a vehicle whose ground reference is set: one whose plan is just setting
+it, and was not heard from the beginning, must set it again."""
+_HEARD_WITHIN_S: Final = 5.0
+_ANOTHER: Final = "Check which vehicle it is, then try again."
+_LEFT: Final = (
+    "The process that flew it ended in flight. Land is repeated if it still flies as in a trial; otherwise it is only "
+    f"observed. If it does not descend, {HELP}."
+)
+_SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
+
+
+class VehicleConnection(ObservedVehicle):
+    """One vehicle on one link, between its flights.
+
+    All changes of a vehicle in quarantine raise SafeGainsError, except Land and motors off.
+    """
+
+    def __init__(
+        self,
+        options: Options,
+        safe_gains: Gains,
+        *,
+        is_real: bool,
+        clock: Clock | None = None,
+        identity: Identity | None = None,
+        observes: bool = False,
+        decided: bool = True,
+        was_flying: bool = False,
+        trial_parameters: Path | None = None,
+        source: AltitudeSource | None = None,
+        transport: Transport | None = None,
+        on_wait: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Connect, wait for the vehicle (with a given `identity`, for that one), and write the safe gains once it is
+        known to be disarmed. Unless a person has `decided` on these safe gains for this very vehicle, they are only
+        compared with those that it holds, which may be its owner's; if they differ, nothing is written.
+
+        A vehicle that `was_flying` in a trial when the process that flew it ended gets Land while it is flown as in a
+        trial, and no heartbeats of a ground station until then.
+
+        `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
+        closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
+        `trial_parameters` keeps the parameters that a trial changes in addition to the gains, so that the next
+        connection can restore them if this process dies. `on_wait` is called while waiting for the vehicle on the
+        ground; an exception from it ends the operation.
+
+        With `observes`, a vehicle that is armed or does not hold its safe gains stays connected and is only observed
+        (see `concern`). Otherwise it raises SafeGainsError, and a vehicle that is not ready to fly VehicleError. Raises
+        VehicleError if no vehicle or another one answers, GainsError for safe gains that it cannot hold.
+        """
+        self.is_real: Final = is_real
+        self._decided, self._plan_problem, self._parameters_folder = decided, "", trial_parameters
+        super().__init__(
+            options,
+            safe_gains,
+            clock=clock,
+            identity=identity,
+            was_flying=was_flying,
+            source=source,
+            transport=transport,
+            on_wait=on_wait,
+        )
+        try:
+            self._parameters = self._trial_parameters()
+            self._connect()
+            if not observes:
+                self._require_ready()
+        except BaseException:
+            self._radio.link.close()
+            raise
+
+    # ---- opening
+
+    def _connect(self) -> None:
+        self._identity.await_vehicle(str(self._options["address"]))
+        self._plan_problem = self._identity.explore()
+        self._quarantine.enter(State.PREFLIGHT)
+        self._listen(0.0)
+        if self._was_flying:
+            self._take_up_landing()
+        if self._quarantine.is_active:
+            return
+        if self._has_set_safe_gains():
+            self._quarantine.enter(State.SET_GAINS)
+            self._quarantine.enter(State.IDLE)
+            self._quarantine.requested, self._repeated, self._was_flying = "", None, False
+
+    def _take_up_landing(self) -> None:
+        """Repeat Land to a vehicle that the process that flew it left in the air, unless it may be another vehicle."""
+        self._identify()
+        self._was_flying = not self._identity.is_another
+        if self._was_flying and not self._identity.missing_uid:
+            self._quarantine.requested = _LEFT
+            self._repeated = RepeatedCommand(self._radio, Action.LAND, is_withheld=True)
+
+    def _trial_parameters(self) -> TrialParameters:
+        """Return the trial parameters of the vehicle that is connected when they are first needed."""
+        if self._parameters_folder is None:
+            return TrialParameters(self._radio)
+        folder, address = self._parameters_folder, addresses.parse(str(self._options["address"]))
+        is_simulated = bool(self._options["simulated"])
+        return TrialParameters(
+            self._radio, lambda: files_for(folder, address, self.identity, is_simulated=is_simulated)
+        )
+
+    def _require_ready(self) -> None:
+        """Raise SafeGainsError while it may only be observed, VehicleError if it is not ready to fly."""
+        if self._quarantine.is_active:
+            raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
+        preflight.require(self.check())
+
+    # ---- safe gains
+
+    def restore(self) -> dict[str, float]:
+        """Write the safe gains and return the values read back, which are equal; a vehicle that is only observed stays
+        so. Raises SafeGainsError if it is armed, is another one, or does not accept them; VehicleError if it does not
+        report its known hardware id."""
+        self._identify()
+        preparation.require_disarmed(self._radio)
+        if self._identity.is_another:
+            raise SafeGainsError(self.concern, hint=_ANOTHER)
+        self._identity.require_uid()
+        if problem := self._restore_all():
+            raise SafeGainsError(f"The vehicle does not accept its earlier values. {problem}", hint=_SET_BY_HAND)
+        return dict(self._gains.held)
+
+    def change_safe_gains(self, safe_gains: Gains) -> None:
+        """Replace the safe gains by those of a person, write them and read them back. Until a person has decided on
+        this vehicle, they are only compared, as on connection. A vehicle that is only observed stays so, and its
+        release writes them. A failure becomes the `concern`. Raises GainsError, and changes nothing, for gains that the
+        vehicle cannot hold."""
+        changed = GainStore(self._radio, safe_gains)
+        changed.held, self._gains = self._gains.held, changed
+        if self._decided and self._quarantine.is_active:
+            return
+        if self._has_set_safe_gains() and self._quarantine.is_active:
+            self._quarantine.end()
+
+    def _restore_all(self) -> str:
+        """Restore the safe gains and the other parameters of a trial; return the problem, or an empty string."""
+        return self._gains.restore_or_explain() or self._parameters.restore()
+
+    def _restore_or_quarantine(self) -> None:
+        """Restore the safe gains, because the staged gains are not flown; quarantine the vehicle if they cannot be
+        verified. A vehicle that is armed keeps its gains, and is observed."""
+        if self._quarantine.is_active:
+            return
+        self._is_restoring = True
+        try:
+            self.restore()
+        except VehicleError as error:
+            self._check_identity()
+            if not self._quarantine.is_active:
+                self._quarantine.begin(State.QUARANTINE, f"Its safe gains could not be verified. {error}")
+        finally:
+            self._is_restoring = False
+
+    def _has_set_safe_gains(self) -> bool:
+        """Write or compare the safe gains; return whether the vehicle holds them and nothing else was found. Otherwise
+        it is only observed."""
+        was_observed = self._quarantine.is_active
+        try:
+            self._set_up()
+        except VehicleError as error:
+            self._observe(str(error) if not self._decided else f"Its safe gains could not be verified. {error}")
+            return False
+        if self._quarantine.is_active and not was_observed:
+            return False
+        self._decided = True
+        self._identity.pinned = self.identity
+        return True
+
+    def _set_up(self) -> None:
+        """Set up telemetry and safe gains. Raises VehicleError if the vehicle is armed, refuses, does not accept its
+        safe gains, or holds others that no person has decided to overwrite."""
+        preparation.require_disarmed(self._radio)
+        self._request_telemetry()
+        if self._decided:
+            self.restore()
+        elif (found := self._gains.read()) != self._gains.safe:
+            raise SafeGainsError(
+                f"It holds {written(found)}, but its safe gains are {written(self._gains.safe)}; nothing was written.",
+                hint="If its current gains are safe, save them as its safe gains. Otherwise release it, which writes "
+                "the safe gains.",
+            )
+        elif problem := self._parameters.restore():
+            raise SafeGainsError(problem, hint=_SET_BY_HAND)
+
+    # ---- preflight checks
+
+    def check(self) -> tuple[CheckItem, ...]:
+        """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
+        error. Raises LinkError if the link is closed."""
+        return self._check(WATCHED_S)[1]
+
+    def _check(self, watched_s: float) -> tuple[GroundObservation, tuple[CheckItem, ...]]:
+        radio, options = self._radio, self._options
+        self._identify()
+        if not preparation.reports_armed(radio) and not self._quarantine.is_active:
+            self._request_telemetry()
+            preparation.make_armable(radio)
+        watched = self._observe_standing(watched_s)
+        for _ in range(_FURTHER_OBSERVATIONS):
+            if self._quarantine.is_active or not (
+                preparation.make_armable(radio) or preparation.set_ground_reference(radio, watched)
+            ):
+                break
+            watched = self._observe_standing(watched_s)
+        if not self._quarantine.is_active:
+            preparation.confirm_stop(radio, watched)
+        minimum_v, pinned = float(options["min_battery_v"]), self._identity.pinned
+        items = preflight.evaluate_items(radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
+        if pinned is not None and pinned.uid:
+            items = (*items, preflight.evaluate_uid(radio, pinned))
+        if self._secondary is not None:
+            items = (*items, preflight.evaluate_secondary(self._secondary, watched))
+        if radio.profile.flying_blocks:
+            radius_m, plan_radius_m = float(options["radius_m"]), float(options["plan_radius_m"])
+            items = (*items, preflight.evaluate_distance(watched, radius_m=radius_m, plan_radius_m=plan_radius_m))
+        items = (*items, self._gains.check())
+        return watched.continued(radio), items
+
+    def _observe_standing(self, watched_s: float) -> GroundObservation:
+        watched = ground_observation.observe(self._radio, self._secondary, watched_s=watched_s)
+        self._identify()
+        return watched
+
+    # ---- quarantine
+
+    def release(self) -> None:
+        """End the observation after a person has inspected the vehicle and its identity. It must be disarmed and hold
+        its safe gains, read back. A vehicle that no longer reports a hardware id is accepted without one. Raises
+        VehicleError, and changes nothing, if it is not received, is armed, does not hold them, or differs from the
+        pinned one in a way that `concern` has not shown yet."""
+        seen, identity = self._quarantine.why, self._identity
+        self._await_heartbeat()
+        self._identify()
+        if (change := identity.change) not in seen:
+            raise SafeGainsError(change, hint=_ANOTHER)
+        if (missing_uid := identity.missing_uid) not in seen:
+            self._quarantine.add(missing_uid)
+            raise SafeGainsError(missing_uid, hint=_ANOTHER)
+        if missing_uid or identity.is_another:
+            self._parameters = self._trial_parameters()
+        accepted = replace(self.identity, uid=self._radio.seen.uid)
+        pinned, identity.pinned, self._decided = identity.pinned, accepted, True
+        try:
+            self._set_up()
+        except BaseException:
+            identity.pinned = pinned
+            raise
+        self._quarantine.end()
+        self._quarantine.requested, self._repeated, self._was_flying = "", None, False
+
+    def _await_heartbeat(self) -> None:
+        since_s = self._radio.clock.now_s()
+        while self._radio.seen.heartbeat_s < since_s:
+            if self._radio.clock.now_s() - since_s > _HEARD_WITHIN_S * self._radio.timeout_factor:
+                raise VehicleError(
+                    "No heartbeat of the vehicle was received.",
+                    hint="Check that it is on and in range, then try again.",
+                )
+            self._listen(LISTEN_S)

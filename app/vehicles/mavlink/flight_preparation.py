@@ -1,0 +1,90 @@
+"""Preparation of a flight with its options: set points, parameters, requirements, the plan of its trial."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.autopilots.commands import Setting
+from app.vehicles.base import CheckItem, FlightOptions
+from app.vehicles.kinds import Options
+from app.vehicles.mavlink import parameters, preflight, preparation
+from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference
+from app.vehicles.mavlink.ground_observation import Ground
+from app.vehicles.mavlink.opening import limits_of
+from app.vehicles.mavlink.parameters import GainStore
+from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.set_point_schedule import with_hold
+from app.vehicles.mavlink.trial_state import Plan
+
+
+def flies_steps(order: FlightOptions) -> bool:
+    """Whether set points follow the takeoff's."""
+    return len(order.set_points.times_s) > 1
+
+
+def prepare_set_points(radio: AutopilotLink, release: int) -> dict[str, float]:
+    """Request the telemetry that a flight with several set points needs, and return the parameters of its loop, which
+    the replica would otherwise replace by defaults; `release` is the place of the vehicle's gains among the sets."""
+    preparation.prepare_set_points(radio)
+    profile = radio.profile
+    if not profile.loop_parameters:
+        return {}
+    return parameters.read_loop(radio, profile.loop_parameters[release], profile.may_lack)
+
+
+def settings_of(order: FlightOptions, radio: AutopilotLink) -> tuple[Setting, ...]:
+    """Return the parameters that the flight needs."""
+    profile, target = radio.profile, radio.target
+    settings = profile.take_off_settings(target)
+    return (*settings, *profile.set_point_settings) if flies_steps(order) else settings
+
+
+def evaluate_time(order: FlightOptions, radio: AutopilotLink, options: Options) -> tuple[CheckItem, ...]:
+    """Check that the flight fits the vehicle's flight plan, if it has one."""
+    if not radio.profile.flying_blocks:
+        return ()
+    return (preflight.evaluate_flight_time(order.record_s, plan_time_s=float(options["plan_time_s"])),)
+
+
+def reference_of(order: FlightOptions, radio: AutopilotLink, ground_m: float) -> Reference | None:
+    """Return the function that computes the autopilot's own reference; None if it sends that, or if it is not
+    needed."""
+    if not flies_steps(order) or radio.profile.reference != "replica":
+        return None
+    return lambda set_points, time_s: simulate_reference(set_points, ground_m, time_s, order.record_s)
+
+
+def compile_reference(order: FlightOptions, radio: AutopilotLink) -> None:
+    """Compute a reference once: the first computation may take seconds, which must not pass after the ground was
+    observed."""
+    if (reference := reference_of(order, radio, 0.0)) is not None:
+        reference(order.set_points, np.zeros(1))
+
+
+def plan_on(ground: Ground, radio: AutopilotLink, options: Options, gains: GainStore) -> Plan:
+    """Return the plan of a takeoff from there."""
+    profile = radio.profile
+    plan = Plan(
+        safe_gains=gains.safe_settings,
+        trial_gains=gains.staged_settings,
+        ground_m=0.0,
+        climbs_from_ground=profile.climbs_from_ground,
+        lift_off_s=profile.lift_off_s,
+        land_again_s=profile.land_again_s,
+        stop_settings=profile.stop_settings,
+        mode_parameter=profile.mode_parameter,
+        limits=limits_of(options, radio),
+    )
+    return plan.on_ground_at(ground.altitude_m)
+
+
+def plan_of(order: FlightOptions, plan: Plan, radio: AutopilotLink) -> Plan:
+    """Return the plan with the set points of the order."""
+    profile, holds = radio.profile, flies_steps(order) and radio.profile.holds_first
+    return replace(
+        plan,
+        record_s=order.record_s,
+        set_points=with_hold(order.set_points) if holds else order.set_points,
+        holds_first=holds,
+        following_modes=profile.following_modes if holds else frozenset(),
+    )

@@ -1,0 +1,121 @@
+"""Observation of a vehicle that stands on the ground before a flight: where it stands, and how it is received."""
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+from app.autopilots.measurements import Heartbeat, Position
+from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
+from app.vehicles.mavlink.radio import AutopilotLink
+
+WATCHED_S: Final = 2.0
+STANDS_WITHIN_M: Final = 0.3
+_LISTEN_S: Final = 0.1
+_RATE_OVER_S: Final = 10.0
+_BATTERY_S: Final = 10.0
+_GOES_ON_S: Final = 1.0
+_IRREGULAR: Final = 0.25
+"""Some autopilots send at intervals that differ by half: a position is lost from 1.75 intervals on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Position of the standing vehicle on its own datum, and its altitudes from a second source, on the source's."""
+
+    altitude_m: float
+    last: Position
+    secondary_m: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class GroundObservation:
+    """Messages of a vehicle on the ground within `seconds`."""
+
+    positions: tuple[Position, ...]
+    seconds: float
+    secondary_m: tuple[float, ...] = ()
+    disarmed: bool = False
+    """Whether there were heartbeats and all of them reported disarmed."""
+    begun_s: float = 0.0
+
+    def continued(self, radio: AutopilotLink) -> "GroundObservation":
+        """Return it with all positions that have been received since it began."""
+        positions = tuple(position for at_s, position in radio.seen.positions if at_s > self.begun_s)
+        return replace(self, positions=positions)
+
+    @property
+    def ground(self) -> Ground:
+        """Position of the ground. Raises ValueError without a position."""
+        altitude_m = statistics.median(position.altitude_m for position in self.positions)
+        return Ground(altitude_m, self._last, self.secondary_m)
+
+    @property
+    def moved_m(self) -> float:
+        """Range of its altitudes."""
+        altitudes_m = [position.altitude_m for position in self.positions]
+        return max(altitudes_m) - min(altitudes_m) if altitudes_m else 0.0
+
+    @property
+    def stands(self) -> bool:
+        """Whether it was seen to stand, disarmed by every heartbeat."""
+        return self.disarmed and bool(self.positions) and self.moved_m <= STANDS_WITHIN_M
+
+    @property
+    def is_at_reference(self) -> bool:
+        """Whether its altitude is that of the ground reference."""
+        return bool(self.positions) and abs(self.ground.altitude_m) <= STANDS_WITHIN_M
+
+    @property
+    def _last(self) -> Position:
+        """Position with the latest time that continues another one: a single one by another clock is ignored, and so
+        are copies that arrive late."""
+        latest_first = sorted(self.positions, key=lambda position: position.time_boot_s, reverse=True)
+        for newer, older in pairwise(latest_first):
+            if newer.time_boot_s - older.time_boot_s < _GOES_ON_S:
+                return newer
+        return latest_first[0]
+
+
+def observe(
+    radio: AutopilotLink, secondary: AlignedAltitudeSource | None, *, watched_s: float = WATCHED_S
+) -> GroundObservation:
+    """Receive for `watched_s`, and for up to 10 s until there is a battery voltage and a heartbeat."""
+    radio.listen(0.0)
+    if secondary is not None:
+        secondary.discard_pending()
+    begun_s = radio.clock.now_s()
+    armed: list[bool] = []
+    while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
+        (radio.seen.battery_v is None or not armed) and now_s < begun_s + _BATTERY_S
+    ):
+        packets = radio.listen(_LISTEN_S)
+        armed += [each.measurement.armed for each in packets if isinstance(each.measurement, Heartbeat)]
+    secondary_m = () if secondary is None else secondary.ground_altitudes()
+    disarmed = bool(armed) and not any(armed)
+    return GroundObservation((), now_s - begun_s, secondary_m, disarmed, begun_s).continued(radio)
+
+
+def find_reception(positions: Sequence[tuple[float, Position]], now_s: float) -> tuple[float, float]:
+    """Return how many positions arrived per second, without repeated ones, and the share that is lost, by the gaps
+    between the others: in the last 10 s, or since there was none for a second. `positions` are given with the time of
+    their receipt. In a single second a link that loses three of ten may seem to lose two. A gap must be one by both
+    clocks, because a stamp may be false, and packets may arrive at once after a stall."""
+    last_s = first_s = now_s
+    heard: list[tuple[float, float]] = []
+    for at_s, position in reversed(positions):
+        last_s = last_s if heard else at_s
+        if last_s - at_s > _RATE_OVER_S or first_s - at_s > _GOES_ON_S:
+            break
+        first_s = at_s
+        heard.append((position.time_boot_s, at_s))
+    new: dict[float, float] = {}
+    for stamp_s, at_s in reversed(heard):
+        new.setdefault(stamp_s, at_s)
+    gaps = [(later[0] - earlier[0], later[1] - earlier[1]) for earlier, later in pairwise(new.items())]
+    if not gaps:
+        return 0.0, 0.0
+    usual_s = statistics.median(later_s - earlier_s for earlier_s, later_s in pairwise(sorted(new)))
+    lost = sum(max(int(min(gap) / usual_s + _IRREGULAR) - 1, 0) for gap in gaps)
+    return len(gaps) / max(last_s - first_s, len(gaps) * usual_s), lost / (lost + len(gaps))

@@ -1,0 +1,74 @@
+"""The envelope: limits of altitude, speed, place, oscillation and lean, and the vehicle's own fence."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from app.autopilots.measurements import Position
+from app.vehicles.mavlink.failures import Failure, Finding, Limits
+from app.vehicles.mavlink.states import replace
+
+_LEAN_RAD: Final = math.radians(20.0)
+_LEANING_OVER_S: Final = 1.5
+_LONGEST_LEAN_S: Final = 0.5
+"""Longest time for which one report of its attitude counts."""
+_LEANING: Final = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvelopeMonitor:
+    """`origin` is the position from which distances count; `side` on which of the set point it was last, +1 above;
+    `may_overshoot`: its next crossing is the overshoot after a change of the set point, which does not count.
+    `leaning` is the recent share of time in which it has leaned by more than 20°, at `attitude_s` last; `breached` the
+    limit of its own fence that it has crossed, empty if none."""
+
+    origin: Position | None = None
+    side: int = -1
+    crossings: int = 0
+    may_overshoot: bool = False
+    leaning: float = 0.0
+    attitude_s: float | None = None
+    breached: str = ""
+
+    def add_position(self, position: Position, limits: Limits) -> "EnvelopeMonitor":
+        above_m = position.altitude_m - limits.set_point_m
+        side = self.side if abs(above_m) <= limits.crossing_m else (1 if above_m > 0.0 else -1)
+        has_crossed = side != self.side
+        if self.origin is not None and not has_crossed:
+            return self
+        return replace(
+            self,
+            origin=self.origin or position,
+            side=side,
+            crossings=self.crossings + (has_crossed and not self.may_overshoot),
+            may_overshoot=self.may_overshoot and not has_crossed,
+        )
+
+    def add_attitude(self, lean_rad: float, now_s: float) -> "EnvelopeMonitor":
+        passed_s = 0.0 if self.attitude_s is None else min(now_s - self.attitude_s, _LONGEST_LEAN_S)
+        weight = -math.expm1(-passed_s / _LEANING_OVER_S)
+        leaning = self.leaning + weight * ((abs(lean_rad) > _LEAN_RAD) - self.leaning)
+        return replace(self, leaning=leaning, attitude_s=now_s)
+
+    def find(self, limits: Limits, last: Position | None, ground_m: float, *, settling: bool) -> Finding | None:
+        """Find a limit that the vehicle has exceeded; crossings of the set point count while it is `settling` there."""
+        why = ""
+        if self.breached:
+            why = f"The vehicle's own fence was crossed: {self.breached}."
+        elif last is not None and self.origin is not None:
+            away_m = last.away_m(self.origin)
+            if (height_m := last.altitude_m - ground_m) > limits.ceiling_m:
+                why = f"It was {height_m:.2f} m above the ground; the limit is {limits.ceiling_m:g} m."
+            elif abs(last.climb_rate_m_s) > limits.climb_rate_m_s:
+                why = f"Its climb rate was {last.climb_rate_m_s:+.1f} m/s; the limit is ±{limits.climb_rate_m_s:g} m/s."
+            elif away_m > limits.radius_m:
+                why = f"It was {away_m:.1f} m from its start; the limit is {limits.radius_m:g} m."
+            elif settling and self.crossings >= limits.crossings:
+                why = f"It crossed its set point {self.crossings} times by more than ±{limits.crossing_m:g} m."
+        return Finding(Failure.ENVELOPE, why) if why else self.find_oscillation()
+
+    def find_oscillation(self) -> Finding | None:
+        if self.leaning <= _LEANING:
+            return None
+        why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
+        return Finding(Failure.ENVELOPE, why)

@@ -1,0 +1,62 @@
+"""The set points after the takeoff's: which of them the vehicle has confirmed, and whether it follows them."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from app.autopilots.measurements import Heartbeat, Measurement, Position, TargetAltitude
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.states import replace
+
+_SAME_M: Final = 0.05
+_ASTRAY_S: Final = 0.3
+"""Time after which it is not a late report of the previous set point, and the next heartbeat is a later one."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetPointChange:
+    """A set point that the vehicle has confirmed, in the record's altitude. `times_s`, in s since the takeoff command
+    by the vehicle's clock: when it took effect, if it was the first, second, … sending of the message that did."""
+
+    altitude_m: float
+    times_s: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SetPointMonitor:
+    """`changes` are the set points that it has confirmed; `is_changing`: it has not confirmed the newest; `settling`
+    are the positions that show whether it is at rest before the first of them. `astray_since_s`: since when it has
+    reported another set point than the one it confirmed. `withdrawn`: a heartbeat has reported a manual mode since the
+    first of them was commanded, after which none is commanded any more."""
+
+    changes: tuple[SetPointChange, ...] = ()
+    is_changing: bool = False
+    settling: tuple[Position, ...] = ()
+    astray_since_s: float | None = None
+    withdrawn: bool = False
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether a set point after the takeoff's has been commanded."""
+        return bool(self.changes) or self.is_changing
+
+    def confirm(self, change: SetPointChange) -> "SetPointMonitor":
+        return replace(self, changes=(*self.changes, change), is_changing=False)
+
+    def update(
+        self, measurement: Measurement | None, now_s: float, wanted_m: float, following_modes: frozenset[str]
+    ) -> tuple["SetPointMonitor", Finding | None]:
+        """Find a vehicle that follows another set point than the one it has confirmed, `wanted_m`, once a heartbeat
+        reports that it still follows set points: a pilot's mode changes its set point too. No `following_modes` if it
+        does not report them."""
+        since_s = self.astray_since_s
+        match measurement:
+            case TargetAltitude(altitude_m=altitude_m):
+                is_known = following_modes and self.changes and not self.is_changing
+                is_astray = is_known and abs(altitude_m - wanted_m) > _SAME_M
+                astray_s = (since_s or now_s) if is_astray else None
+                return self if astray_s == since_s else replace(self, astray_since_s=astray_s), None
+            case Heartbeat(mode=mode) if since_s is not None and now_s - since_s >= _ASTRAY_S:
+                why = "Its set point was changed by a command that was not Gainline's."
+                return self, Finding(Failure.INTERRUPTED, why) if mode in following_modes else None
+            case _:
+                return self, None

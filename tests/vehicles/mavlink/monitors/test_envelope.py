@@ -1,0 +1,61 @@
+import pytest
+
+from app.autopilots.measurements import FenceBreach, Position
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.observation import TrialObservation
+from tests.vehicles.mavlink.monitors.observing import START_S, told, watch_of
+from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
+
+
+def envelope(watch: TrialObservation, *, settling: bool = True) -> str | None:
+    finding = watch.envelope.find(LIMITS, watch.last, GROUND_M, settling=settling)
+    return None if finding is None else finding.why
+
+
+def test_the_corridor_is_measured_from_the_ground_under_the_vehicle() -> None:
+    assert envelope(watch_of(4.59)) is None
+    assert envelope(watch_of(4.61)) == "It was 4.51 m above the ground; the limit is 4.5 m."
+
+
+@pytest.mark.parametrize("climb_rate_m_s", [4.1, -4.1])
+def test_speed_is_limited_in_both_directions(climb_rate_m_s: float) -> None:
+    assert (
+        envelope(watch_of(2.0, climb_rate_m_s=climb_rate_m_s))
+        == f"Its climb rate was {climb_rate_m_s:+g} m/s; the limit is ±4 m/s."
+    )
+    assert envelope(watch_of(2.0, climb_rate_m_s=climb_rate_m_s * 0.97)) is None
+
+
+def test_drifting_away_is_limited() -> None:
+    watch = watching.begin(START_S, last=Position(9.98, 3.0, 0.0))
+    watch, _ = watching.update(watch, Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, LIMITS)
+    assert envelope(watch) == "It was 5.1 m from its start; the limit is 5 m."
+
+
+def test_four_crossings_of_the_set_point_are_an_oscillation_and_three_are_not() -> None:
+    swing = [2.6, 3.4, 2.6, 3.4]
+    assert envelope(watch_of(*swing, every_s=1.0)) is None
+    assert envelope(watch_of(*swing, 2.6, every_s=1.0)) == "It crossed its set point 4 times by more than ±0.3 m."
+    assert envelope(watch_of(*swing, 2.6, every_s=1.0), settling=False) is None
+
+
+def test_ripples_within_the_band_are_no_crossings() -> None:
+    assert watch_of(*[2.75, 3.25] * 20, every_s=0.2).envelope.crossings == 0
+
+
+def test_the_vehicles_own_fence_counts() -> None:
+    watch = told(watch_of(3.0), FenceBreach("its greatest altitude"), at_s=10.1)
+    assert envelope(watch) == "The vehicle's own fence was crossed: its greatest altitude."
+
+
+def test_a_speed_beyond_reason_that_lasts_is_an_abort() -> None:
+    watch = watch_of(3.0, 3.0)
+    for at_s, altitude_m in ((10.04, 3.14), (10.06, 3.28)):
+        watch, _ = watching.update(watch, Position(at_s, altitude_m, 7.0), at_s, LIMITS)
+    assert envelope(watch) == "Its climb rate was +7.0 m/s; the limit is ±4 m/s."
+
+
+def test_a_lone_speed_beyond_reason_is_no_abort() -> None:
+    watch = watch_of(3.0, 3.0)
+    watch, kept = watching.update(watch, Position(10.04, 3.0, 7.0), 10.04, LIMITS)
+    assert (kept, envelope(watch)) == ((), None)
