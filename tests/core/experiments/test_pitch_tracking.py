@@ -57,11 +57,12 @@ def test_a_step_is_exact_to_the_fourth_order() -> None:
     assert moved == pytest.approx(exact[:5], abs=2.0 * step_s**5 * 500.0)
 
 
-def test_the_inaccurate_models_are_drawn_as_the_definition_says() -> None:
+@pytest.mark.parametrize(("options", "off"), [({}, 0.45), ({"perturbation": 0.2}, 0.2), ({"perturbation": 0.8}, 0.8)])
+def test_the_inaccurate_models_are_drawn_as_the_definition_says(options: dict[str, float], off: float) -> None:
     random = np.random.default_rng(50)
-    a = A * (1.0 + random.uniform(-0.45, 0.45, (5, 5)))
-    b = B * (1.0 + random.uniform(-0.45, 0.45, (5, 2)))
-    experiment = get_experiment("pitch-tracking", {"model_seed": 50})
+    a = A * (1.0 + random.uniform(-off, off, (5, 5)))
+    b = B * (1.0 + random.uniform(-off, off, (5, 2)))
+    experiment = get_experiment("pitch-tracking", {"model_seed": 50, **options})
     assert isinstance(experiment, PitchTracking)
     assert (experiment.systems(experiment.nominal_model) == np.hstack((a, b))).all()
 

@@ -57,20 +57,9 @@ Flying = list[tuple[tuple[float, ...], float, int]]
 
 
 @pytest.mark.complete
-@settings(max_examples=4)
-@given(DEFINITIONS, FLYING)
-def test_every_proposal_and_every_advice_is_recomputed_bit_for_bit(definition: Definition, flying: Flying) -> None:
-    recompute(definition, flying)
-
-
-@pytest.mark.complete
 @settings(max_examples=8)
 @given(DEFINITIONS, FLYING)
-def test_so_are_those_of_many_more_campaigns(definition: Definition, flying: Flying) -> None:
-    recompute(definition, flying)
-
-
-def recompute(definition: Definition, flying: Flying) -> None:
+def test_every_proposal_and_every_advice_is_recomputed_bit_for_bit(definition: Definition, flying: Flying) -> None:
     assert not problems_of(definition)
     donor = fly(4, TUNED, TWIN) if definition.start == WARM else None
     flights: list[Flight] = []
