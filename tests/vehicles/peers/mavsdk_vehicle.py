@@ -1,25 +1,22 @@
 """An independent vehicle: MAVSDK's vehicle-side plugins with the simplest possible flight model.
 
-On the wire it has PX4's modes, parameters and answers; all of it is MAVSDK's own. Its time is this computer's.
+On the wire it has PX4's modes, parameters and answers; all of it is MAVSDK's own. Time passes by its steps, of which a
+busy machine makes fewer: whoever flies it has the same clock.
 """
 
+import json
 import random
 import threading
-import time
 from collections.abc import Mapping
+from itertools import count
 from types import TracebackType
 from typing import Any, Final, Self
 
 from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.action_server.action_server import ActionServer, AllowableFlightModes, FlightMode
+from mavsdk.plugins.mavlink_direct_server.mavlink_direct_server import MavlinkDirectServer, MavlinkMessage
 from mavsdk.plugins.param_server.param_server import ParamServer
-from mavsdk.plugins.telemetry_server.telemetry_server import (
-    Battery,
-    PositionNed,
-    PositionVelocityNed,
-    TelemetryServer,
-    VelocityNed,
-)
+from mavsdk.plugins.telemetry_server.telemetry_server import Battery, TelemetryServer
 
 MAKE: Final = 0
 """MAVSDK says of itself that it is a generic autopilot."""
@@ -33,7 +30,6 @@ FLOATS: Final[Mapping[str, float]] = {**GAINS, "MIS_TAKEOFF_ALT": 2.5, "GF_MAX_V
 INTEGERS: Final[Mapping[str, int]] = {"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 10, "GF_ACTION": 5}
 GROUND_M: Final = 0.5
 STEP_S: Final = 0.01
-"""Twice as often as is asked for, so that enough is left on a busy machine."""
 _UP_M_S: Final = 1.5
 _DOWN_M_S: Final = 0.7
 _BATTERY_EVERY: Final = 50
@@ -43,11 +39,37 @@ _BATTERY_V: Final = 12.3
 _NOISE_M = 1e-4
 
 
+class StepClock:
+    """Advances by the vehicle's steps; never faster than the clock on the wall, and slower on a busy machine."""
+
+    def __init__(self) -> None:
+        self._steps = 0
+        self._stepped = threading.Condition()
+
+    def step(self) -> None:
+        with self._stepped:
+            self._steps += 1
+            self._stepped.notify_all()
+
+    def now_s(self) -> float:
+        return self._steps * STEP_S
+
+    def wait_s(self, seconds: float) -> None:
+        until_s = self.now_s() + seconds
+        with self._stepped:
+            self._stepped.wait_for(lambda: self.now_s() >= until_s)
+
+    def wall_s(self, seconds: float) -> float:
+        """Who waits for something else looks again after a step."""
+        return min(seconds, STEP_S)
+
+
 class MavsdkVehicle:
     """Speaks to a ground station's port until it is left. Its climb rate is MPC_Z_P times what is missing in altitude,
     between the two limits; the other gains are only kept."""
 
-    def __init__(self, port: int, *, armable: bool = True) -> None:
+    def __init__(self, port: int, clock: StepClock, *, armable: bool = True) -> None:
+        self._clock = clock
         self.altitude_m = GROUND_M
         self.flew_with: list[dict[str, float]] = []
         """The gains that it held at each takeoff."""
@@ -63,6 +85,7 @@ class MavsdkVehicle:
         for name, whole in INTEGERS.items():
             self._parameters.provide_param_int(name, whole)
         self._telemetry: Any = TelemetryServer(component)
+        self._direct: Any = MavlinkDirectServer(component)
         self._actions: Any = ActionServer(component)
         self._actions.set_allowable_flight_modes(
             AllowableFlightModes(can_auto_takeoff_mode=True, can_auto_land_mode=True, can_auto_loiter_mode=True)
@@ -102,21 +125,23 @@ class MavsdkVehicle:
         self._mode = mode
 
     def _run(self) -> None:
-        """What a busy machine held up is flown at once and told once, for MAVSDK stamps what it sends. In the air it
+        """A position for each step, with the step's time: MAVSDK would stamp it with this computer's. In the air it
         cannot be disarmed."""
-        begun_s, steps = time.monotonic(), 0
-        while not self._leaving.wait(max(begun_s + steps * STEP_S - time.monotonic(), 0.0)):
-            due = 1 + int((time.monotonic() - begun_s) / STEP_S)
-            tell_battery = due // _BATTERY_EVERY > steps // _BATTERY_EVERY
-            for _ in range(steps, due):
-                self._move()
-            steps = due
+        for step in count(1):
+            if self._leaving.wait(STEP_S):
+                return
+            self._move()
+            self._clock.step()
             self._actions.set_disarmable(self.stands, False)
-            position = PositionNed(0.0, 0.0, -self.altitude_m - _NOISE_M * random.random())  # never the same twice
-            velocity = VelocityNed(0.0, 0.0, -self._climb_rate_m_s)
-            self._telemetry.publish_position_velocity_ned(PositionVelocityNed(position, velocity))
-            if tell_battery:
+            self._tell_position(step * STEP_S)
+            if step % _BATTERY_EVERY == 0:
                 self._telemetry.publish_sys_status(Battery(_BATTERY_V, 90.0), True, True, True, True, True)
+
+    def _tell_position(self, time_s: float) -> None:
+        down_m = -self.altitude_m - _NOISE_M * random.random()  # never the same twice
+        fields = {"time_boot_ms": round(1000 * time_s), "x": 0.0, "y": 0.0, "z": down_m}
+        fields |= {"vx": 0.0, "vy": 0.0, "vz": -self._climb_rate_m_s}
+        self._direct.send_message(MavlinkMessage("LOCAL_POSITION_NED", fields_json=json.dumps(fields)))
 
     def _move(self) -> None:
         match self._mode:

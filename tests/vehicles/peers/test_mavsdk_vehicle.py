@@ -1,4 +1,4 @@
-"""The program's ground side with MAVSDK's independent vehicle, over real UDP and in real time."""
+"""The program's ground side with MAVSDK's independent vehicle, over real UDP, by the vehicle's clock."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.registry import AUTOPILOTS
+from app.vehicles import mavlink_kind
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, OptionValue, Vehicle, VehicleError
 from app.vehicles.mavlink import opening
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -17,16 +18,16 @@ from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle
 from tests.ports import free_port
 from tests.vehicles.flying import never, unwatched
-from tests.vehicles.peers.mavsdk_vehicle import FLOATS, INTEGERS, MAKE, MavsdkVehicle
+from tests.vehicles.peers.mavsdk_vehicle import FLOATS, INTEGERS, MAKE, MavsdkVehicle, StepClock
 from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
 from tests.waiting import eventually
 
-pytestmark = pytest.mark.real_time("MAVSDK's vehicle knows no other clock")
+pytestmark = pytest.mark.real_time("its steps are never faster than the clock on the wall")
 
 TUNED = {"MPC_Z_P": 1.25, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.05, "MPC_Z_VEL_I_ACC": 1.7}
 RECORD_S = 6.0
 ORDER = FlightOptions(seed=1, window_s=RECORD_S - RECORDED_BEYOND_S)
-"""The record is shorter, because time is real."""
+"""The record is shorter, because its time passes on the wall."""
 
 
 @pytest.fixture(autouse=True)
@@ -36,24 +37,32 @@ def generic_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(opening, "AUTOPILOTS", {**AUTOPILOTS, "px4": generic})
 
 
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> StepClock:
+    """Of both sides."""
+    shared = StepClock()
+    monkeypatch.setattr(mavlink_kind, "ScaledClock", lambda _speed: shared)
+    return shared
+
+
 def options_at(port: int) -> dict[str, OptionValue]:
     return {"autopilot": "px4", "address": f"udpin:127.0.0.1:{port}", "simulated": True}
 
 
 @contextmanager
-def met(*, armable: bool = True) -> Iterator[tuple[MavsdkVehicle, Vehicle]]:
+def met(clock: StepClock, *, armable: bool = True) -> Iterator[tuple[MavsdkVehicle, Vehicle]]:
     """MAVSDK's vehicle, and what we make of it once its positions arrive: a busy machine loses some of the first."""
     port = free_port()
     opened = partial(open_vehicle, "mavlink", options_at(port), safe_gains=SAFE)
-    with MavsdkVehicle(port, armable=armable) as peer, opened() as ours:
+    with MavsdkVehicle(port, clock, armable=armable) as peer, opened() as ours:
         assert isinstance(ours, MavlinkVehicle)
         eventually(lambda: all(item.passed for item in ours.check() if item.name == "position"))
         yield peer, ours
 
 
 @pytest.mark.complete
-def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back() -> None:
-    with met() as (peer, ours):
+def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back(clock: StepClock) -> None:
+    with met(clock) as (peer, ours):
         assert ours.stage(TUNED) == TUNED
         record = ours.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert ours.read_gains() == SAFE
@@ -68,8 +77,10 @@ def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back()
 
 
 @pytest.mark.complete
-def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_gains() -> None:
-    with met(armable=False) as (peer, ours):
+def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_gains(
+    clock: StepClock,
+) -> None:
+    with met(clock, armable=False) as (peer, ours):
         ours.stage(TUNED)
         with pytest.raises(VehicleError, match="temporarily rejected"):
             ours.fly(ORDER, on_sample=unwatched, should_stop=never)
@@ -77,10 +88,10 @@ def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_g
 
 
 @pytest.mark.complete
-def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters(tmp_path: Path) -> None:
+def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters(tmp_path: Path, clock: StepClock) -> None:
     port = free_port()
     assert MAVLINK.connect is not None
-    with MavsdkVehicle(port):
+    with MavsdkVehicle(port, clock):
         options = MAVLINK.check(options_at(port), field="options")
         ours = MAVLINK.connect(options, SAFE, tmp_path / "parameters.json", None, lambda: None, False)
         try:
