@@ -53,9 +53,16 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+def waiting_s(item: pytest.Item) -> float:
+    """About as long as a test of real time takes; 0 for any other."""
+    mark = item.get_closest_marker("real_time")
+    return 0.0 if mark is None else float(mark.kwargs.get("about_s", 1.0))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that wait come first: one process waits with them, while the others use the processors."""
-    items.sort(key=lambda item: item.get_closest_marker("real_time") is None)
+    """Tests that wait come first: one process waits with them, while the others use the processors. Those that wait
+    longest are the first of them, so that none is still waited for at the end."""
+    items.sort(key=waiting_s, reverse=True)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -90,7 +90,7 @@ def data_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "data"
 
 
-@pytest.mark.real_time("a drone flies in a process of its own, over real UDP")
+@pytest.mark.real_time("a drone flies in a process of its own, over real UDP", about_s=30)
 @pytest.mark.complete
 def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -> None:
     out = tmp_path / "campaign.json"

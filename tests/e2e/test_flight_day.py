@@ -29,7 +29,7 @@ from tests.e2e.states import States
 from tests.e2e.test_pages import ROOT
 from tests.runtime.drones import Drone
 
-pytestmark = pytest.mark.real_time("a drone flies in a process of its own, over real UDP")
+pytestmark = pytest.mark.real_time("a drone flies in a process of its own, over real UDP", about_s=60)
 
 PICTURES: Final = ROOT / "docs" / "images" / "day"
 ARE_TAKEN: Final = bool(os.environ.get("GAINLINE_README_IMAGE"))

@@ -30,7 +30,7 @@ from tests.e2e.flying_by_hand import (
 from tests.e2e.states import States
 from tests.runtime.drones import SAFE, TRIED, Drone
 
-pytestmark = pytest.mark.real_time("a drone flies in a process of its own, over real UDP")
+pytestmark = pytest.mark.real_time("a drone flies in a process of its own, over real UDP", about_s=10)
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
 from tests.e2e.wifi import InterruptibleProxy
 
-pytestmark = pytest.mark.real_time("a page notices a lost connection after a time of its own")
+pytestmark = pytest.mark.real_time("a page notices a lost connection after a time of its own", about_s=10)
 
 CHARTS_FETCHED = "performance.getEntriesByType('resource').some(one => one.name.includes('plotly'))"
 

@@ -38,7 +38,7 @@ def clone(folder: Path) -> None:
 
 
 @pytest.mark.complete
-@pytest.mark.real_time("a server, a drone and an installation run in processes of their own")
+@pytest.mark.real_time("a server, a drone and an installation run in processes of their own", about_s=40)
 @pytest.mark.skipif(not (ROOT / "frontend" / "dist").is_symlink(), reason="./dev has not set this checkout up")
 @pytest.mark.skipif(not may_unshare(), reason="this user may not take a process off the network (unshare --net)")
 def test_a_clone_that_was_set_up_once_works_at_an_airfield(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from app.runtime.http_connections import RESERVED_FOR_ABORTS, room_for_connectio
 from tests.runtime.processes import Serving, in_the_air
 from tests.waiting import Waits
 
-pytestmark = pytest.mark.real_time("a real server closes connections after times of its own")
+pytestmark = pytest.mark.real_time("a real server closes connections after times of its own", about_s=10)
 
 FILES: Final = 256
 """That the server may have open."""

@@ -13,7 +13,7 @@ import pytest
 from tests.runtime.processes import Serving, children, fork_server, in_the_air, is_alive
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.real_time("processes are killed, noticed and replaced")
+pytestmark = pytest.mark.real_time("processes are killed, noticed and replaced", about_s=15)
 
 
 def require_sound_database(data_dir: Path) -> None:

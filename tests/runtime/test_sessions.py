@@ -10,7 +10,7 @@ from tests.runtime.processes import Serving, stream
 from tests.runtime.test_storage import locked
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.real_time("drones fly in processes of their own, over real UDP")
+pytestmark = pytest.mark.real_time("drones fly in processes of their own, over real UDP", about_s=20)
 WINDOW_S = 12.0
 """Scored, of flights that the tests wait for."""
 

@@ -15,7 +15,7 @@ from tests.vehicles.flying import SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_vehicle import TAKEOFF, fly
 
-pytestmark = pytest.mark.real_time("cameras are received in a thread of their own, over real UDP")
+pytestmark = pytest.mark.real_time("cameras are received in a thread of their own, over real UDP", about_s=10)
 
 
 def natnet(port: int) -> str:

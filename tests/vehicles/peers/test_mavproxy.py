@@ -14,7 +14,7 @@ from tests.simdrone.paparazzi import CLIMB, HOLDING_POINT, LAND_HERE, START_ENGI
 from tests.vehicles.peers.mavproxy import MavProxy
 from tests.waiting import eventually
 
-pytestmark = pytest.mark.real_time("MAVProxy knows no other clock")
+pytestmark = pytest.mark.real_time("MAVProxy knows no other clock", about_s=5)
 
 SPEED = 5.0
 
