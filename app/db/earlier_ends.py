@@ -7,10 +7,28 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-from app.vehicles.end_texts import FAILURE_TEXTS
-
 _FAILURES: Final[Mapping[str, str]] = {
-    **{text: failure.value for failure, text in reversed([*FAILURE_TEXTS.items()])},
+    "No heartbeat was received; nothing was sent.": "F1",
+    "The vehicle did not confirm its gains; it was not armed.": "F2",
+    "The vehicle did not arm.": "F3",
+    "The vehicle did not lift off.": "F4a",
+    "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe or "
+    "flight plan lands it.": "F5",
+    "A safety limit was exceeded.": "F6",
+    "The vehicle's position froze while packets still arrived.": "F9a",
+    "Too many samples had to be dropped.": "F9b",
+    "Two sources of altitude disagree.": "F9c",
+    "The vehicle's position was lost.": "F9d",
+    "The vehicle's clock is slower than the clock speed in its settings.": "F9e",
+    "A pilot took manual control; no further commands were sent.": "F10a",
+    "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.": "F10b",
+    "The flight may have been interrupted.": "F10c",
+    "The vehicle began to land by itself.": "F11",
+    "Two vehicles use the same system id. Both were commanded to land; their motors were not stopped.": "F12",
+    "The vehicle fell.": "F13",
+    "The vehicle did not confirm a new set point.": "F14a",
+    "The steps were not flown.": "F14b",
+    "The set points paused.": "F14c",
     "A safety limit was met.": "F6",
     "A person may have flown the vehicle for a moment.": "F10c",
     "Somebody took the vehicle over by hand; it was left alone.": "F10a",
@@ -22,7 +40,7 @@ _FAILURES: Final[Mapping[str, str]] = {
     "Two vehicles speak under one system id; both were told to land, and no motors were stopped.": "F12",
 }
 """How a reason begins, and the number of its failure, the first if several have the sentence: in the words of 0.3.0,
-which are today's, and of 0.2.0. A sentence that is changed is added as it was."""
+then of 0.2.0."""
 ORIGINS: Final[Mapping[str, str]] = {
     "unstaged by the operator": "operator",
     "unstaged from another browser": "another browser",
