@@ -328,7 +328,7 @@ class VehicleProcess(FlightLoop):
             case ActKind.CHECK:
                 checks = self._vehicle.check()
             case ActKind.PARAMETERS:
-                parameters = self._vehicle.parameters(lambda _count, _of: None)
+                parameters = self._vehicle.parameters()
             case ActKind.RESTORE:
                 self._vehicle.restore()
             case ActKind.RELEASE:

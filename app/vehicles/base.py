@@ -258,9 +258,8 @@ class ConnectedVehicle(Vehicle, Protocol):
         """Run all preflight checks; a failed check is an item of the result, not an error."""
         ...
 
-    def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
-        """Read every parameter of the vehicle; `on_progress` receives how many have arrived, and the total. Raises
-        VehicleError if they do not arrive."""
+    def parameters(self) -> dict[str, float]:
+        """Read every parameter of the vehicle. Raises VehicleError if they do not arrive."""
         ...
 
     def restore(self) -> dict[str, float]:
