@@ -54,7 +54,7 @@ class VehicleKind:
     find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = lambda _options, _hosts: ()
     is_simulation: Callable[[Options, Hosts], bool] = lambda _options, _hosts: False
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None
-    check_gains: Callable[[Options, Gains], None] = lambda _options, _gains: None
+    check_gains: Callable[[Options, Gains], object] = lambda _options, _gains: None
     longest_window_s: Callable[[Options], float] = lambda _options: math.inf
     altitude_limit_m: float | None = None
     highest_set_point_m: float = math.inf

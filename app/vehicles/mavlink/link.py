@@ -54,6 +54,8 @@ DUPLICATE_TIMEOUT_S: Final = 3.0
 _TOLD_ONCE: Final = frozenset({"PARAM_VALUE", "COMMAND_ACK", "MISSION_ACK", "SCRIPT_CURRENT"})
 """Messages of something that has happened: a copy of one that arrives later is out of date."""
 
+_COMPONENT: Final = 190
+"""The usual one of a ground station (MAV_COMP_ID_MISSIONPLANNER)."""
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
 
@@ -124,8 +126,6 @@ class Link:
         clock: Clock,
         target_system: int | None = None,
         make: int | None = None,
-        system: int = GROUND_STATION,
-        component: int = 190,
         tlog: Path | None = None,
         signing_key: bytes | None = None,
         transport: Transport | None = None,
@@ -134,7 +134,7 @@ class Link:
         """Open the link. Raises LinkError if the address or the file cannot be opened, InputError if the dialect cannot
         be signed."""
         self._address, self._dialect, self._clock = address, dialect, clock
-        self._identity, self._is_silent = (system, component, signing_key), is_silent
+        self._signing_key, self._is_silent = signing_key, is_silent
         self._codec = self._new_codec()
         self._heartbeat = dialect.message("HEARTBEAT", _GROUND_STATION)
         self._transport = transport or open_transport(address)
@@ -422,8 +422,7 @@ class Link:
             tlog.write(self._opened_unix_us + passed_us, frame)
 
     def _new_codec(self) -> Codec:
-        system, component, key = self._identity
-        return self._dialect.codec(system=system, component=component, signing_key=key)
+        return self._dialect.codec(system=GROUND_STATION, component=_COMPONENT, signing_key=self._signing_key)
 
 
 _GROUND_STATION: Final[dict[str, FieldValue]] = {
