@@ -28,7 +28,7 @@ from app.fleet.control import record_act, require_may, require_may_command, requ
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, require_idle, set_vehicle_state
 from app.fleet.views import act_view, is_linked_or_wanted, settings_of, vehicle_view
-from app.vehicles.base import CheckItem, Identity, OptionValue
+from app.vehicles.base import CheckItem, Identity, LinkedVehicle
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
@@ -42,22 +42,6 @@ _WITHDRAWN: Final = {
 }
 _READ_ONLY_ACTS: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
 """Acts that change nothing on the vehicle, so that every operator may request them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkedVehicle:
-    """What a worker needs to open the link to a vehicle; `identity` is the pinned one, None before the first
-    connection. `was_flying`: a process of Gainline may have left it in the air, because its gains, which are only
-    read on the ground, have not been read since its last takeoff."""
-
-    vehicle_id: int
-    name: str
-    kind: str
-    is_real: bool
-    options: dict[str, OptionValue]
-    safe_gains: dict[str, float]
-    identity: Identity | None
-    was_flying: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -323,7 +307,6 @@ def _linked(session: Session, row: VehicleRow) -> LinkedVehicle:
         vehicle_id=row.id,
         name=row.name,
         kind=row.kind,
-        is_real=row.is_real,
         options=settings_of(row),
         safe_gains=dict(row.safe_gains),
         identity=_pinned(row),

@@ -310,7 +310,18 @@ def get_or_create_imported_vehicle(
         called = f"{name[:_ROOM]} (elsewhere{'' if number == 1 else f', {number}'})"
         known = repository.of_name_or_none(session, called)
         if known is None:
-            return _made(session, called, is_real=is_real, options=origin, safe_gains=safe_gains)
+            row = VehicleRow(
+                kind=IMPORT.name,
+                name=called,
+                title=IMPORT.title,
+                is_real=is_real,
+                options=origin,
+                safe_gains=dict(safe_gains),
+                state=VehicleState.DISCONNECTED,
+            )
+            session.add(row)
+            session.flush()
+            return row
         if (known.kind, known.registered, known.is_real, known.options) == (IMPORT.name, False, is_real, origin):
             return known
     raise AssertionError("unreachable")
@@ -321,20 +332,3 @@ def origin_of(row: VehicleRow) -> tuple[str, str] | None:
     if row.registered or _KIND not in row.options:
         return None
     return str(row.options[_KIND]), str(row.options[_NAME])
-
-
-def _made(
-    session: Session, name: str, *, is_real: bool, options: dict[str, OptionValue], safe_gains: Mapping[str, float]
-) -> VehicleRow:
-    row = VehicleRow(
-        kind=IMPORT.name,
-        name=name,
-        title=IMPORT.title,
-        is_real=is_real,
-        options=options,
-        safe_gains=dict(safe_gains),
-        state=VehicleState.DISCONNECTED,
-    )
-    session.add(row)
-    session.flush()
-    return row

@@ -31,26 +31,7 @@ from app.fleet.views import (
 )
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
 
-__all__ = [
-    "battery_flights",
-    "campaign_vehicle",
-    "can_fly",
-    "chosen_vehicle",
-    "doubt_gains",
-    "get_vehicle",
-    "hold_gains",
-    "is_classed_automatically",
-    "list_vehicles",
-    "needs_staging",
-    "options_of",
-    "registered_for",
-    "require_idle",
-    "require_ready",
-    "safe_gains_changes",
-    "set_state_after_flight",
-    "set_vehicle_state",
-    "simulation_for",
-]
+__all__ = ["campaign_vehicle", "can_fly", "needs_staging", "options_of"]
 
 _GAINS_NOT_READ_BACK: Final = "Its process ended before the safe gains were read back after the flight."
 

@@ -22,14 +22,14 @@ from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.db.session import Database, retry_until_stored
 from app.fleet import commands
-from app.fleet.commands import ActTask, LinkedVehicle
+from app.fleet.commands import ActTask
 from app.flights.abort import AbortRegistry
 from app.flights.connection_process import run_connection_process
 from app.flights.flight_commands import record_abort
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
-from app.vehicles.base import SafeGainsError, VehicleError
+from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError
 from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
 from app.vehicles.flight_end import StopRequest
 
@@ -112,7 +112,9 @@ class VehicleConnectionManager:
         for session in [slot.session for slot in slots if slot.session is not None]:
             session.close()
             if session.is_running:
-                _log.warning("still commanding a vehicle that may be in the air", vehicle_id=session.call.vehicle_id)
+                _log.warning(
+                    "still commanding a vehicle that may be in the air", vehicle_id=session.call.vehicle.vehicle_id
+                )
         self._record_executor.shutdown()
 
     # ---- from any thread
@@ -253,7 +255,7 @@ class VehicleConnectionManager:
     def _schedule_reconnect(self, vehicle: LinkedVehicle) -> None:
         slot = self._slot(vehicle.vehicle_id)
         seeking = slot.reconnecting
-        if seeking is not None and seeking.call.options != vehicle.options:
+        if seeking is not None and seeking.call.vehicle.options != vehicle.options:
             seeking.request_close()
         if slot.session is None and seeking is None and slot.busy.acquire(blocking=False):
             self._reconnect_executor.submit(self._reconnect, slot, vehicle)
@@ -284,18 +286,7 @@ class VehicleConnectionManager:
             slot.session.close()
         slot.restarts = None
         self._publish_state(vehicle_id, "connecting")
-        call = ConnectionRequest(
-            vehicle_id=vehicle_id,
-            name=vehicle.name,
-            kind=vehicle.kind,
-            options=vehicle.options,
-            safe_gains=vehicle.safe_gains,
-            identity=vehicle.identity,
-            data_dir=self._data_dir,
-            was_flying=vehicle.was_flying,
-            keep_retrying=patient,
-            clock=self._clock,
-        )
+        call = ConnectionRequest(vehicle=vehicle, data_dir=self._data_dir, keep_retrying=patient, clock=self._clock)
         session = slot.reconnecting = VehicleConnection(
             call, run_connection_process, hear=partial(self._on_message, slot, vehicle_id)
         )

@@ -79,7 +79,10 @@ def run_connection_process(pipe: Connection, call: ConnectionRequest) -> None:
     line = WorkerPipe(pipe)
     try:
         with hold_vehicle_lock(
-            vehicle_lock(call.data_dir, call.vehicle_id), within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock
+            vehicle_lock(call.data_dir, call.vehicle.vehicle_id),
+            within_s=LOCK_TIMEOUT_S,
+            wanted=line.is_open,
+            clock=call.clock,
         ):
             process = VehicleProcess(line, call)
             try:
@@ -104,7 +107,7 @@ class VehicleProcess(FlightLoop):
         """Connect to the vehicle. Raises VehicleError when it does not answer."""
         super().__init__(line, call.clock)
         self._call = call
-        self._speed = float(call.options.get("clock_speed", 1.0))
+        self._speed = float(call.vehicle.options.get("clock_speed", 1.0))
         self._is_open = self._may_interrupt = False
         self._staging: Staging = "none"
         self._take_off_by_s: float | None = None
@@ -155,10 +158,10 @@ class VehicleProcess(FlightLoop):
                 self._clock.wait_s(POLL_INTERVAL_S)
 
     def _connect(self) -> ConnectedVehicle:
-        call = self._call
-        connect, folder = get_kind(call.kind).connect, trial_parameters_folder(call.data_dir)
-        assert connect is not None, call.kind
-        return connect(call.options, call.safe_gains, folder, call.identity, self._while_waiting, call.was_flying)
+        it, folder = self._call.vehicle, trial_parameters_folder(self._call.data_dir)
+        connect = get_kind(it.kind).connect
+        assert connect is not None, it.kind
+        return connect(it.options, it.safe_gains, folder, it.identity, self._while_waiting, it.was_flying)
 
     def _next(self) -> ToVehicleProcess:
         """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
@@ -287,7 +290,7 @@ class VehicleProcess(FlightLoop):
         known = {each.name: getattr(condition, each.name) for each in fields(condition)}
         age_s = condition.heartbeat_age_s
         return VehicleStatus(
-            vehicle_id=self._call.vehicle_id,
+            vehicle_id=self._call.vehicle.vehicle_id,
             state="gone" if age_s is None or age_s > LOST_AFTER_S else "connected",
             at=status_time(),
             concern=self._vehicle.concern,
@@ -325,7 +328,7 @@ class VehicleProcess(FlightLoop):
             case ActKind.CHECK:
                 checks = self._vehicle.check()
             case ActKind.PARAMETERS:
-                parameters = self._vehicle.parameters(lambda _count, _of: None)
+                parameters = self._vehicle.parameters()
             case ActKind.RESTORE:
                 self._vehicle.restore()
             case ActKind.RELEASE:

@@ -15,7 +15,7 @@ from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
-from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, OptionValue
+from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, LinkedVehicle, OptionValue
 from app.vehicles.flight_end import StopRequest
 
 
@@ -129,19 +129,12 @@ FlightMessage = (
 class ConnectionRequest:
     """What the process needs to connect to a vehicle.
 
-    `identity` is the pinned one, None before the first connection. `was_flying`: an earlier process may have left it in
-    the air. `keep_retrying`: retry until the vehicle answers. The vehicle's lock, its telemetry logs and the parameters
-    that a trial changes are in `data_dir`.
+    `keep_retrying`: retry until the vehicle answers. The vehicle's lock, its telemetry logs and the parameters that a
+    trial changes are in `data_dir`.
     """
 
-    vehicle_id: int
-    name: str
-    kind: str
-    options: Mapping[str, OptionValue]
-    safe_gains: Mapping[str, float]
-    identity: Identity | None
+    vehicle: LinkedVehicle
     data_dir: Path
-    was_flying: bool = False
     keep_retrying: bool = False
     clock: Clock = REAL_TIME
 

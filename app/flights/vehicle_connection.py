@@ -68,7 +68,7 @@ class VehicleConnection(FlightProcess):
     def __init__(
         self, call: ConnectionRequest, run: Callable[[Connection, ConnectionRequest], None], *, hear: MessageHandler
     ) -> None:
-        super().__init__(run, call, name=f"session {call.name}")
+        super().__init__(run, call, name=f"session {call.vehicle.name}")
         self.call: Final = call
         self._hear_of = hear
         self._messages: queue.SimpleQueue[FromVehicleProcess | None] = queue.SimpleQueue()
@@ -79,7 +79,7 @@ class VehicleConnection(FlightProcess):
         """Commands that the vehicle has not confirmed."""
         self._ended = threading.Event()
         self._open = False
-        threading.Thread(target=self._listen, name=f"session {call.name}", daemon=True).start()
+        threading.Thread(target=self._listen, name=f"session {call.vehicle.name}", daemon=True).start()
 
     @property
     def alive(self) -> bool:
@@ -159,7 +159,7 @@ class VehicleConnection(FlightProcess):
         return received
 
     def _listen(self) -> None:
-        status = VehicleStatus(vehicle_id=self.call.vehicle_id, state="connecting", at=status_time(), step="")
+        status = VehicleStatus(vehicle_id=self.call.vehicle.vehicle_id, state="connecting", at=status_time(), step="")
         patience_s: float | None = None
         try:
             while True:

@@ -1,11 +1,6 @@
-"""A simulated drone: an autopilot with its body and faults, served on a link, or in lockstep with its ground side.
-
-In lockstep the drone's time is the clock of both sides and advances only while the ground side waits, so that the same
-inputs give the same packets at the same instants, independent of the machine.
-"""
+"""A simulated drone: an autopilot with its body and faults, and its service on a link."""
 
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -14,7 +9,7 @@ from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, 
 from app.core.clock import Clock
 from app.simdrone.faults import Faults, PlannedFault
 from app.simdrone.motion_capture import MocapOutput, MotionCapture
-from app.vehicles.mavlink.transports import Peer, Transport
+from app.vehicles.mavlink.transports import Transport
 
 BOOT_S: Final = 2.0
 """Silence after a reboot."""
@@ -84,78 +79,6 @@ class Drone:
         if key not in self._codecs:
             self._codecs[key] = self.autopilot.dialect.codec(system=system, component=self.autopilot.component)
         return self._codecs[key].pack(self.autopilot.dialect.message(message.kind, message.fields))
-
-
-PEER: Final[Peer] = ("lockstep", 0)
-
-
-class Lockstep:
-    """The ground side's clock and its transport: `MavlinkVehicle(…, clock=lockstep, transport=lockstep)`.
-
-    `muted`: the drone receives, but none of its packets arrive. The drone sends from the address `peer`, and receives
-    only what is sent there.
-    """
-
-    def __init__(self, drone: Drone) -> None:
-        self.drone: Final = drone
-        self.muted = False
-        self.peer = self.remote = PEER
-        self._frames: deque[tuple[bytes, Peer]] = deque()
-
-    # ---- the clock of both sides
-
-    def now_s(self) -> float:
-        """Return the time since the drone was switched on, s."""
-        return self.drone.time_s
-
-    def wait_s(self, seconds: float) -> None:
-        """Advance the drone by this time, in whole ticks. Raises VehicleError if the simulation diverged."""
-        until_s = self.drone.time_s + seconds
-        while self.drone.time_s < until_s:
-            self.tick()
-
-    def wall_s(self, seconds: float) -> float:  # noqa: ARG002 - independent of the vehicle's time
-        """Return 0: nothing takes wall time."""
-        return 0.0
-
-    # ---- the ground side's transport
-
-    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:  # noqa: ARG002 - nothing more comes by itself
-        frames = list(self._frames)
-        self._frames.clear()
-        return frames
-
-    def write(self, data: bytes) -> bool:
-        if self.remote == self.peer:
-            self.drone.receive(data)
-        return True
-
-    def adopt(self, peer: Peer) -> None:
-        self.remote = peer
-
-    def wake(self) -> None:
-        """Do nothing: no thread waits."""
-
-    def close(self) -> None:
-        """Discard the packets that have not been read."""
-        self._frames.clear()
-
-    # ----
-
-    def tick(self) -> None:
-        """Advance the drone by one tick."""
-        frames = self.drone.tick()
-        if not self.muted:
-            for frame in self.arriving(frames):
-                self.deliver(frame, self.peer)
-
-    def deliver(self, frame: bytes, peer: Peer) -> None:
-        """Let a packet arrive from this address."""
-        self._frames.append((frame, peer))
-
-    def arriving(self, frames: list[bytes]) -> list[bytes]:
-        """Return the packets of one tick that arrive; subclasses override it to disturb the link."""
-        return frames
 
 
 LARGEST_LAG_S: Final = 2.0

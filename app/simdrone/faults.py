@@ -94,6 +94,20 @@ class ChangedMessages(Fault, ABC):
         """Return the fields that differ."""
 
 
+class Switched(Fault, ABC):
+    """Base of faults that are one setting of the drone."""
+
+    @abstractmethod
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        """Change the setting."""
+
+    def begin(self, drone: FaultTarget) -> None:
+        self.switch(drone, on=True)
+
+    def end(self, drone: FaultTarget) -> None:
+        self.switch(drone, on=False)
+
+
 class NoHeartbeat(MissingMessages):
     """HEARTBEAT is not sent."""
 
@@ -101,40 +115,31 @@ class NoHeartbeat(MissingMessages):
     kinds = frozenset({"HEARTBEAT"})
 
 
-class ParamUnconfirmed(Fault):
+class ParamUnconfirmed(Switched):
     """PARAM_SET changes nothing and has no reply."""
 
     name = "param-unconfirmed"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.autopilot.ignores_parameters = True
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.autopilot.ignores_parameters = False
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.autopilot.ignores_parameters = on
 
 
-class ArmRefused(Fault):
+class ArmRefused(Switched):
     """The autopilot refuses to arm, with its own messages."""
 
     name = "arm-refused"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.autopilot.refuses_arming = True
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.autopilot.refuses_arming = False
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.autopilot.refuses_arming = on
 
 
-class NoLiftOff(Fault):
+class NoLiftOff(Switched):
     """The motors do not turn, without the autopilot detecting it. In the air the drone falls."""
 
     name = "no-lift-off"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.body.motors_dead = True
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.body.motors_dead = False
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.body.motors_dead = on
 
 
 class LinkLost(Fault):
@@ -352,52 +357,40 @@ class WrongSystem(Fault):
         return [replace(message, system=_WRONG_SYSTEM) for message in messages]
 
 
-class CarriedAway(Fault):
+class CarriedAway(Switched):
     """In the air the drone drifts north at 2 m/s without correction."""
 
     name = "carried-away"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.body.wind_m_s = _WIND_M_S
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.body.wind_m_s = 0.0
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.body.wind_m_s = _WIND_M_S if on else 0.0
 
 
-class MocapLost(Fault):
+class MocapLost(Switched):
     """Motion capture loses the drone, reports it as not tracked, and repeats its last place."""
 
     name = "mocap-lost"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.cameras.blind = True
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.cameras.blind = False
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.cameras.blind = on
 
 
-class MocapFrozen(Fault):
+class MocapFrozen(Switched):
     """Motion capture repeats its last frame."""
 
     name = "mocap-frozen"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.cameras.stuck = True
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.cameras.stuck = False
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.cameras.stuck = on
 
 
-class MocapDrift(Fault):
+class MocapDrift(Switched):
     """The altitude of motion capture drifts from the true one by 0.1 m/s."""
 
     name = "mocap-drift"
 
-    def begin(self, drone: FaultTarget) -> None:
-        drone.cameras.drifts = True
-
-    def end(self, drone: FaultTarget) -> None:
-        drone.cameras.drifts = False
+    def switch(self, drone: FaultTarget, *, on: bool) -> None:
+        drone.cameras.drifts = on
 
 
 @dataclass

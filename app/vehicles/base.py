@@ -163,6 +163,21 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LinkedVehicle:
+    """What is needed to open the link to a vehicle; `identity` is the pinned one, None before the first connection.
+    `was_flying`: a process of Gainline may have left it in the air, because its gains, which are only read on the
+    ground, have not been read since its last takeoff."""
+
+    vehicle_id: int
+    name: str
+    kind: str
+    options: Mapping[str, OptionValue]
+    safe_gains: Gains
+    identity: Identity | None
+    was_flying: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
     """Current state of a connected vehicle; None or empty where unknown.
 
@@ -243,9 +258,8 @@ class ConnectedVehicle(Vehicle, Protocol):
         """Run all preflight checks; a failed check is an item of the result, not an error."""
         ...
 
-    def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
-        """Read every parameter of the vehicle; `on_progress` receives how many have arrived, and the total. Raises
-        VehicleError if they do not arrive."""
+    def parameters(self) -> dict[str, float]:
+        """Read every parameter of the vehicle. Raises VehicleError if they do not arrive."""
         ...
 
     def restore(self) -> dict[str, float]:

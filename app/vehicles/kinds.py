@@ -18,22 +18,6 @@ Hosts = frozenset[str]
 HERE: Final[Hosts] = frozenset()
 
 
-def _no_conflicts(_options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
-    return ()
-
-
-def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
-    return False
-
-
-def _unlimited(_options: Options) -> float:
-    return math.inf
-
-
-def _accept_any_gains(_options: Options, _gains: Gains) -> None:
-    """Accept all gains: a simulation flies whatever its controller can hold."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleKind:
     """A registered kind of vehicle.
@@ -67,11 +51,11 @@ class VehicleKind:
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains, Path | None], Vehicle]
     connect: Callable[[Options, Gains, Path, Identity | None, Callable[[], None], bool], ConnectedVehicle] | None = None
-    find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
-    is_simulation: Callable[[Options, Hosts], bool] = _never
+    find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = lambda _options, _hosts: ()
+    is_simulation: Callable[[Options, Hosts], bool] = lambda _options, _hosts: False
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None
-    check_gains: Callable[[Options, Gains], None] = _accept_any_gains
-    longest_window_s: Callable[[Options], float] = _unlimited
+    check_gains: Callable[[Options, Gains], object] = lambda _options, _gains: None
+    longest_window_s: Callable[[Options], float] = lambda _options: math.inf
     altitude_limit_m: float | None = None
     highest_set_point_m: float = math.inf
 

@@ -136,13 +136,8 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
     return tuple(problems)
 
 
-def _experiments(options: Options) -> tuple[str, ...]:
-    """Return the experiments whose gains the autopilot has."""
-    return tuple(each.name for each in AUTOPILOTS[str(options["autopilot"])].experiments)
-
-
-def _check_gains(options: Options, gains: Gains) -> None:
-    check_gains(gains, AUTOPILOTS[str(options["autopilot"])].gain_sets[0])
+def _autopilot(options: Options) -> Autopilot:
+    return AUTOPILOTS[str(options["autopilot"])]
 
 
 def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
@@ -244,8 +239,8 @@ MAVLINK: Final = VehicleKind(
     connect=partial(_open, observes=True),
     find_conflicts=_conflicts,
     is_simulation=is_simulated,
-    experiments_for=_experiments,
-    check_gains=_check_gains,
+    experiments_for=lambda options: tuple(each.name for each in _autopilot(options).experiments),
+    check_gains=lambda options, gains: check_gains(gains, _autopilot(options).gain_sets[0]),
     longest_window_s=_longest_window_s,
     altitude_limit_m=ALTITUDE_LIMIT_M,
     highest_set_point_m=HIGHEST_SET_POINT_M,

@@ -220,8 +220,10 @@ class SimulatedVehicle(GainHolder):
             rows: list[Rows] = []
             stop = self._take_off(simulation, rows, order, on_sample, should_stop)
             self._restore()
-            if stop is not None:
-                rows.extend(self._land(simulation, rows[-1]) if rows else [self._stay(simulation)])
+            if stop is not None and rows:
+                rows.extend(self._land(simulation, rows[-1]))
+            elif stop is not None:  # before the first step: a single instant on the ground
+                rows.append(_flown(simulation, 1, _command(THROTTLE, 0, self._held), 0.0))
         finally:
             self._restore()
         flown = np.concatenate(rows)
@@ -245,27 +247,20 @@ class SimulatedVehicle(GainHolder):
         for first, last in _slices(order.record_s, order.set_points):
             if (stop := pacer.wait_until(first * STEP_S, should_stop)) is not None:
                 return stop
-            command = self._command(ALT, int(targets[min(first, len(targets) - 1)]))
+            command = _command(ALT, int(targets[min(first, len(targets) - 1)]), self._held)
             set_point_m = float(order.set_points.at(np.array([first * STEP_S]))[0])
             rows.append(_flown(simulation, last - first, command, set_point_m))
             on_sample(_sample(first, rows[-1][0]))
         return None
 
-    def _stay(self, simulation: Simulation) -> Rows:
-        """Record a single instant on the ground, for an abort before the first step."""
-        return _flown(simulation, 1, self._command(THROTTLE, 0), 0.0)
-
     def _land(self, simulation: Simulation, last: Rows) -> Iterator[Rows]:
         """Descend until the vehicle stands on the ground, for at most 30 s, without pacing."""
-        command = self._command(CLIMB, fix(-_LANDING_RATE_M_S, SPEED_BITS))
+        command = _command(CLIMB, fix(-_LANDING_RATE_M_S, SPEED_BITS), self._held)
         for _ in range(round(_LANDING_S * RATE_HZ) // _LANDING_SLICE):
             if last[-1, ALTITUDE] <= _LANDED_M:
                 return
             last = _flown(simulation, _LANDING_SLICE, command, 0.0)
             yield last
-
-    def _command(self, mode: int, target: int) -> Integers:
-        return _command(mode, target, self._held)
 
 
 def opener(

@@ -228,9 +228,8 @@ class _Checker:
         if self.within(self.of(FLIES_HOME), State.ARM, *AIR, State.LAND) > 0.0:
             yield Cause("F10b", "invalid", is_certain=home_s > 2.0 * self.heartbeat_s + 2.0 + SLACK_S)
             yield Cause("F4", "aborted")
-        leant_s = self.within(self.of(LEAN_OSCILLATION), *AIR)
-        if leant_s > 0.0:
-            yield Cause("F6", "aborted", is_certain=leant_s > 6.0)
+        if self.within(self.of(LEAN_OSCILLATION), *AIR, State.LAND) > 0.0:
+            yield Cause("F6", "aborted", is_certain=self.within(self.of(LEAN_OSCILLATION), *AIR) > 6.0)
 
     def _by_other_people(self) -> Iterator[Cause]:
         """Yield the failures that a pilot, another ground station or this computer causes."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from app.autopilots.dialects import FieldValue
 from app.simdrone.body import new_body
-from app.simdrone.drone import BOOT_S, Drone, Lockstep
+from app.simdrone.drone import BOOT_S, Drone
 from app.simdrone.motion_capture import VehicleLinkOutput
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue
@@ -28,6 +28,7 @@ from bench.hazards.cases import (
 )
 from bench.hazards.trial_states import RESTING_M, State, TrialStates
 from bench.hazards.wire import DIALECTS, GAINS, Command, read_command, stops_motors
+from bench.lockstep import Lockstep
 
 SILENCING: Final = frozenset({"link-lost", "wrong-system", "no-heartbeat", "reboot"})
 _LONGEST_S: Final = 400.0

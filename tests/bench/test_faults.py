@@ -259,6 +259,8 @@ FURTHER: Final[Sequence[Row]] = [
         for state, delay_s, outcome in ((State.ARM, 0.6, "refused"), (State.TAKEOFF, 0.1, "aborted"))
         for act, autopilot in product(("abort", "motors-off"), SAFE)
     ),
+    # seed 7024: the landing is still flown with the trial's gains, so that its limits count against them
+    (befallen("lean-oscillation", State.LAND, 2.0, autopilot="px4"), "aborted", "safe"),
     # a program that stood still between listening and looking at the time took its own silence for the vehicle's
     (befallen("stall", State.RECORD, 2.0, 1.2), "completed", "safe"),
 ]

@@ -35,7 +35,7 @@ from app.flights.process_messages import (
     VehicleCommand,
     VehicleRequest,
 )
-from app.vehicles.base import Identity
+from app.vehicles.base import Identity, LinkedVehicle
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -118,16 +118,10 @@ def take_the_place_of_every_vehicle(one: AnsweringRig, monkeypatch: pytest.Monke
 def started(
     rig: AnsweringRig, line: WorkerPipe, folder: Path, safe_gains: Mapping[str, float] = SAFE
 ) -> VehicleProcess:
-    call = ConnectionRequest(
-        vehicle_id=1,
-        name="Bench drone",
-        kind="mavlink",
-        options=rig.options(),
-        safe_gains=safe_gains,
-        identity=None,
-        data_dir=folder,
-        clock=rig,
+    vehicle = LinkedVehicle(
+        vehicle_id=1, name="Bench drone", kind="mavlink", options=rig.options(), safe_gains=safe_gains, identity=None
     )
+    call = ConnectionRequest(vehicle=vehicle, data_dir=folder, clock=rig)
     return VehicleProcess(line, call)
 
 

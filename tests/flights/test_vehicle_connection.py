@@ -16,7 +16,7 @@ from app.flights import vehicle_connection as session_module
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleCommand
 from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import VehicleStatus
-from app.vehicles.base import Identity
+from app.vehicles.base import Identity, LinkedVehicle
 from tests.waiting import Waits
 
 IDENTITY = Identity(system_id=1, autopilot="paparazzi", version="5.18")
@@ -90,15 +90,8 @@ def session(
 ) -> Iterator[tuple[VehicleConnection, "queue.SimpleQueue[LiveMessage]"]]:
     """One that is open, and what it hears."""
     heard: queue.SimpleQueue[LiveMessage] = queue.SimpleQueue()
-    call = ConnectionRequest(
-        vehicle_id=5,
-        name="Drone",
-        kind="mavlink",
-        options={},
-        safe_gains={},
-        identity=None,
-        data_dir=folder,
-    )
+    vehicle = LinkedVehicle(vehicle_id=5, name="Drone", kind="mavlink", options={}, safe_gains={}, identity=None)
+    call = ConnectionRequest(vehicle=vehicle, data_dir=folder)
     one = VehicleConnection(call, run, hear=heard.put)
     try:
         assert one.wait_until_open() == OPENED

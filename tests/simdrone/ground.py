@@ -15,13 +15,14 @@ from typing import Any, Final, Protocol
 from app.autopilots.simulated.body import TICK_S, Make
 from app.core.clock import Clock, ScaledClock
 from app.simdrone.body import new_body
-from app.simdrone.drone import Drone, Lockstep, Server
+from app.simdrone.drone import Drone, Server
 from app.simdrone.faults import parse_fault
 from app.simdrone.motion_capture import MocapOutput
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.transports import open_transport
+from bench.lockstep import Lockstep
 from tests.waiting import Waits
 
 MODULES: Final = {

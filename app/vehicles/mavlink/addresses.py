@@ -7,9 +7,7 @@ serial:DEVICE:BAUD         a telemetry radio or cable
 """
 
 import ipaddress
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from app.core.errors import InputError, Problem
@@ -69,10 +67,18 @@ Address = UdpAddress | UdpInAddress | TcpAddress | SerialAddress
 def parse(text: str) -> Address:
     """Parse an address; str() of the result is the text again. Raises InputError with the reason if it is invalid."""
     kind, _, rest = text.strip().partition(":")
-    place, colon, number = rest.rpartition(":")
-    if kind not in _PARSERS or not colon or not place:
-        raise _error(text, f"must be {FORMS}")
-    return _PARSERS[kind](text, place, number)
+    place, _, number = rest.rpartition(":")
+    match kind:
+        case "udp" if place:
+            port, at, local = number.partition("@")
+            return UdpAddress(place, _port(text, port), _port(text, local) if at else None)
+        case "udpin" if place:
+            return UdpInAddress(place, _port(text, number))
+        case "tcp" if place:
+            return TcpAddress(place, _port(text, number))
+        case "serial" if place:
+            return SerialAddress(place, _positive(text, number, "the baud rate"))
+    raise _error(text, f"must be {FORMS}")
 
 
 def is_loopback(address: Address) -> bool:
@@ -88,28 +94,6 @@ def is_loopback_host(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-def _udp(text: str, host: str, ports: str) -> UdpAddress:
-    port, at, local = ports.partition("@")
-    return UdpAddress(host, _port(text, port), _port(text, local) if at else None)
-
-
-def _udp_in(text: str, host: str, port: str) -> UdpInAddress:
-    return UdpInAddress(host, _port(text, port))
-
-
-def _tcp(text: str, host: str, port: str) -> TcpAddress:
-    return TcpAddress(host, _port(text, port))
-
-
-def _serial(text: str, device: str, baud: str) -> SerialAddress:
-    return SerialAddress(device, _positive(text, baud, "the baud rate"))
-
-
-_PARSERS: Final[Mapping[str, Callable[[str, str, str], Address]]] = MappingProxyType(
-    {"udp": _udp, "udpin": _udp_in, "tcp": _tcp, "serial": _serial}
-)
 
 
 def _port(text: str, digits: str) -> int:

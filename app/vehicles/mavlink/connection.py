@@ -1,23 +1,17 @@
 """Connection to a vehicle with a MAVLink autopilot: its opening, safe gains, preflight checks and release."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 from app.autopilots.commands import Action
-from app.core.clock import Clock
 from app.core.policy import Gains
-from app.vehicles.base import CheckItem, Identity, SafeGainsError, VehicleError
-from app.vehicles.kinds import Options
+from app.vehicles.base import CheckItem, SafeGainsError, VehicleError
 from app.vehicles.mavlink import addresses, ground_observation, preflight, preparation
-from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mavlink.failures import HELP
 from app.vehicles.mavlink.ground_observation import WATCHED_S, GroundObservation
 from app.vehicles.mavlink.observed_vehicle import LISTEN_S, ObservedVehicle
 from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
-from app.vehicles.mavlink.transports import Transport
 from app.vehicles.mavlink.trial_state import State
 
 _FURTHER_OBSERVATIONS: Final = 3
@@ -38,61 +32,13 @@ class VehicleConnection(ObservedVehicle):
     All changes of a vehicle in quarantine raise SafeGainsError, except Land and motors off.
     """
 
-    def __init__(
-        self,
-        options: Options,
-        safe_gains: Gains,
-        *,
-        is_real: bool,
-        clock: Clock | None = None,
-        identity: Identity | None = None,
-        observes: bool = False,
-        decided: bool = True,
-        was_flying: bool = False,
-        trial_parameters: Path | None = None,
-        source: AltitudeSource | None = None,
-        transport: Transport | None = None,
-        on_wait: Callable[[], None] = lambda: None,
-    ) -> None:
-        """Connect, wait for the vehicle (with a given `identity`, for that one), and write the safe gains once it is
-        known to be disarmed. Unless a person has `decided` on these safe gains for this very vehicle, they are only
-        compared with those that it holds, which may be its owner's; if they differ, nothing is written.
-
-        A vehicle that `was_flying` in a trial when the process that flew it ended gets Land while it is flown as in a
-        trial, and no heartbeats of a ground station until then.
-
-        `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
-        closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
-        `trial_parameters` keeps the parameters that a trial changes in addition to the gains, so that the next
-        connection can restore them if this process dies. `on_wait` is called while waiting for the vehicle on the
-        ground; an exception from it ends the operation.
-
-        With `observes`, a vehicle that is armed or does not hold its safe gains stays connected and is only observed
-        (see `concern`). Otherwise it raises SafeGainsError, and a vehicle that is not ready to fly VehicleError. Raises
-        VehicleError if no vehicle or another one answers, GainsError for safe gains that it cannot hold.
-        """
-        self.is_real: Final = is_real
-        self._decided, self._plan_problem, self._parameters_folder = decided, "", trial_parameters
-        super().__init__(
-            options,
-            safe_gains,
-            clock=clock,
-            identity=identity,
-            was_flying=was_flying,
-            source=source,
-            transport=transport,
-            on_wait=on_wait,
-        )
-        try:
-            self._parameters = self._trial_parameters()
-            self._connect()
-            if not observes:
-                self._require_ready()
-        except BaseException:
-            self._radio.link.close()
-            raise
-
     # ---- opening
+
+    def _open(self, *, observes: bool) -> None:
+        self._parameters = self._trial_parameters()
+        self._connect()
+        if not observes:
+            self._require_ready()
 
     def _connect(self) -> None:
         self._identity.await_vehicle(str(self._options["address"]))

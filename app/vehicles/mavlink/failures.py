@@ -1,4 +1,5 @@
-"""Failures of a trial: detection, reaction and outcome of each; and the limits of a trial.
+"""Failures of a trial: reaction and outcome of each; and the limits of a trial. Their conditions are described in
+docs/real-flight.md.
 
 The table is ordered by severity: of several failures the first one counts.
 """
@@ -22,88 +23,37 @@ Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Response to a failure. `detection`: condition of the failure; `reaction`: immediate action."""
+    """Response to a failure; `reaction` is the immediate action."""
 
-    detection: str
     reaction: Reaction
     outcome: Outcome
 
 
 RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
     {
-        Failure.NO_HEARTBEAT: Response("no heartbeat within 5 s", "none", "refused"),
-        Failure.PARAMETER: Response(
-            "a gain unconfirmed after five attempts, 0.5 s apart, or read back with another value",
-            "restore gains",
-            "refused",
-        ),
-        Failure.NOT_ARMED: Response("arming refused, or not armed within 2 s", "disarm", "refused"),
-        Failure.NO_LIFT_OFF: Response(
-            "still less than 0.15 m above the ground when the lift-off time limit ends", "disarm", "aborted"
-        ),
-        Failure.TAKE_OFF_REFUSED: Response("takeoff refused", "disarm", "refused"),
-        Failure.LINK: Response("no packet for 1 s, or three heartbeats missed", "repeat land", "invalid"),
-        Failure.ENVELOPE: Response(
-            "a limit of altitude, position, speed, lean or oscillation, or the vehicle's own fence",
-            "land, gains first",
-            "aborted",
-        ),
-        Failure.BATTERY: Response("below the limit for 1 s, or unknown for 10 s", "land", "invalid"),
-        Failure.OPERATOR: Response("requested by the operator", "land, gains first", "aborted"),
-        Failure.FROZEN: Response(
-            "packets arrive, but the vehicle's clock stands still for 0.25 s or jumps by more than 0.3 s, or its "
-            "altitude and climb rate stand still for 1 s",
-            "land",
-            "invalid",
-        ),
-        Failure.GLITCHES: Response(
-            "more than three lone samples that jump by 0.3 m or are faster than 6 m/s", "note", "invalid"
-        ),
-        Failure.DISAGREEMENT: Response("two sources more than 0.3 m apart for 0.3 s", "land", "invalid"),
-        Failure.LOST_POSITION: Response(
-            "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
-            "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than "
-            "1 m, or contradicts the vehicle's landed state",
-            "land",
-            "invalid",
-        ),
-        Failure.SLOW_CLOCK: Response(
-            "the record incomplete 3 s after its end, by the ground's clock", "land", "invalid"
-        ),
-        Failure.TAKEN_OVER: Response("a manual mode, in heartbeats that agree", "cease", "quarantine"),
-        Failure.UNEXPECTED: Response(
-            "another mode or block, a disarming or a reboot that was not commanded, in messages that agree, also when "
-            "it is found during the landing",
-            "land",
-            "quarantine",
-        ),
-        Failure.INTERRUPTED: Response(
-            "one heartbeat in a manual mode, and the next in another; under ArduCopter and PX4 also a flight that "
-            "never came within 1 m of the set point, or whose set point was changed by another ground station; a "
-            "gain that changed in flight",
-            "note",
-            "invalid",
-        ),
-        Failure.OWN_LANDING: Response(
-            "a landing that was not commanded: its own failsafe, or an exception of its flight plan", "land", "invalid"
-        ),
-        Failure.DUPLICATE: Response(
-            "repeated sequence numbers with different contents, or two alternating clocks, under one system id",
-            "land",
-            "quarantine",
-        ),
-        Failure.FALL: Response("ground contact at more than 2 m/s", "note", "quarantine"),
-        Failure.SET_POINT: Response(
-            "a new set point refused, unconfirmed after three attempts, 0.5 s apart, or more than 1.5 s late",
-            "land",
-            "invalid",
-        ),
-        Failure.NOT_SETTLED: Response(
-            "not at rest within 0.2 m in the 2 s before the first step", "land, gains first", "invalid"
-        ),
-        Failure.PAUSED: Response(
-            "no set point sent for 0.5 s to an autopilot that must receive them continuously", "land", "invalid"
-        ),
+        Failure.NO_HEARTBEAT: Response("none", "refused"),
+        Failure.PARAMETER: Response("restore gains", "refused"),
+        Failure.NOT_ARMED: Response("disarm", "refused"),
+        Failure.NO_LIFT_OFF: Response("disarm", "aborted"),
+        Failure.TAKE_OFF_REFUSED: Response("disarm", "refused"),
+        Failure.LINK: Response("repeat land", "invalid"),
+        Failure.ENVELOPE: Response("land, gains first", "aborted"),
+        Failure.BATTERY: Response("land", "invalid"),
+        Failure.OPERATOR: Response("land, gains first", "aborted"),
+        Failure.FROZEN: Response("land", "invalid"),
+        Failure.GLITCHES: Response("note", "invalid"),
+        Failure.DISAGREEMENT: Response("land", "invalid"),
+        Failure.LOST_POSITION: Response("land", "invalid"),
+        Failure.SLOW_CLOCK: Response("land", "invalid"),
+        Failure.TAKEN_OVER: Response("cease", "quarantine"),
+        Failure.UNEXPECTED: Response("land", "quarantine"),
+        Failure.INTERRUPTED: Response("note", "invalid"),
+        Failure.OWN_LANDING: Response("land", "invalid"),
+        Failure.DUPLICATE: Response("land", "quarantine"),
+        Failure.FALL: Response("note", "quarantine"),
+        Failure.SET_POINT: Response("land", "invalid"),
+        Failure.NOT_SETTLED: Response("land, gains first", "invalid"),
+        Failure.PAUSED: Response("land", "invalid"),
     }
 )
 

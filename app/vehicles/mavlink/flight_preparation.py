@@ -1,7 +1,5 @@
 """Preparation of a flight with its options: set points, parameters, requirements, the plan of its trial."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from app.autopilots.commands import Setting
@@ -61,9 +59,9 @@ def compile_reference(order: FlightOptions, radio: AutopilotLink) -> None:
         reference(order.set_points, np.zeros(1))
 
 
-def plan_on(ground: Ground, radio: AutopilotLink, options: Options, gains: GainStore) -> Plan:
-    """Return the plan of a takeoff from there."""
-    profile = radio.profile
+def plan_of(order: FlightOptions, ground: Ground, radio: AutopilotLink, options: Options, gains: GainStore) -> Plan:
+    """Return the plan of a flight from there, with the set points of the order."""
+    profile, holds = radio.profile, flies_steps(order) and radio.profile.holds_first
     plan = Plan(
         safe_gains=gains.safe_settings,
         trial_gains=gains.staged_settings,
@@ -74,17 +72,9 @@ def plan_on(ground: Ground, radio: AutopilotLink, options: Options, gains: GainS
         stop_settings=profile.stop_settings,
         mode_parameter=profile.mode_parameter,
         limits=limits_of(options, radio),
-    )
-    return plan.on_ground_at(ground.altitude_m)
-
-
-def plan_of(order: FlightOptions, plan: Plan, radio: AutopilotLink) -> Plan:
-    """Return the plan with the set points of the order."""
-    profile, holds = radio.profile, flies_steps(order) and radio.profile.holds_first
-    return replace(
-        plan,
         record_s=order.record_s,
         set_points=with_hold(order.set_points) if holds else order.set_points,
         holds_first=holds,
         following_modes=profile.following_modes if holds else frozenset(),
     )
+    return plan.on_ground_at(ground.altitude_m)

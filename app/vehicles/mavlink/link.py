@@ -9,7 +9,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -54,6 +54,8 @@ DUPLICATE_TIMEOUT_S: Final = 3.0
 _TOLD_ONCE: Final = frozenset({"PARAM_VALUE", "COMMAND_ACK", "MISSION_ACK", "SCRIPT_CURRENT"})
 """Messages of something that has happened: a copy of one that arrives later is out of date."""
 
+_COMPONENT: Final = 190
+"""The usual one of a ground station (MAV_COMP_ID_MISSIONPLANNER)."""
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
 
@@ -66,25 +68,25 @@ class Received:
     received_s: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True)
 class LinkHealth:
     """Statistics of a link; times in seconds of the link's clock."""
 
-    received: int
+    received: int = 0
     """Messages of the vehicle that the dialect knows."""
-    lost: int
+    lost: int = 0
     """Messages missing by the vehicle's sequence numbers."""
-    bad: int
+    bad: int = 0
     """Sections of bad data: wrong checksums, wrong signatures."""
-    foreign: int
+    foreign: int = 0
     """Datagrams of other senders and messages of other systems, all dropped."""
-    overrun: int
+    overrun: int = 0
     """Messages dropped because `receive` was not called."""
-    sent: int
-    unsent: int
+    sent: int = 0
+    unsent: int = 0
     """Messages that could not be sent: no peer yet, no connection, full buffer."""
-    last_packet_s: float | None
-    last_heartbeat_s: float | None
+    last_packet_s: float | None = None
+    last_heartbeat_s: float | None = None
 
 
 class LossCounter:
@@ -124,8 +126,6 @@ class Link:
         clock: Clock,
         target_system: int | None = None,
         make: int | None = None,
-        system: int = GROUND_STATION,
-        component: int = 190,
         tlog: Path | None = None,
         signing_key: bytes | None = None,
         transport: Transport | None = None,
@@ -134,7 +134,7 @@ class Link:
         """Open the link. Raises LinkError if the address or the file cannot be opened, InputError if the dialect cannot
         be signed."""
         self._address, self._dialect, self._clock = address, dialect, clock
-        self._identity, self._is_silent = (system, component, signing_key), is_silent
+        self._signing_key, self._is_silent = signing_key, is_silent
         self._codec = self._new_codec()
         self._heartbeat = dialect.message("HEARTBEAT", _GROUND_STATION)
         self._transport = transport or open_transport(address)
@@ -153,9 +153,7 @@ class Link:
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
         self._plan: dict[float, bytes] = {}
-        self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
-        self._last_packet_s: float | None = None
-        self._last_heartbeat_s: float | None = None
+        self._health = LinkHealth()
         self._next_heartbeat_s = self._attended_s = self._opened_s
         self._listeners = 0
         self._inbox: deque[Received] = deque()
@@ -198,17 +196,7 @@ class Link:
     @property
     def health(self) -> LinkHealth:
         with self._inbox_changed:
-            return LinkHealth(
-                received=self._received,
-                lost=self._losses.lost,
-                bad=self._bad,
-                foreign=self._foreign,
-                overrun=self._overrun,
-                sent=self._sent,
-                unsent=self._unsent,
-                last_packet_s=self._last_packet_s,
-                last_heartbeat_s=self._last_heartbeat_s,
-            )
+            return replace(self._health, lost=self._losses.lost)
 
     def send(self, kind: str, **fields: FieldValue) -> None:
         """Send the message `kind` ("PARAM_SET") without waiting; on return it was sent or counted as unsent.
@@ -320,10 +308,10 @@ class Link:
         """Send a message; the caller holds the lock for sending."""
         frame = self._codec.pack(message)
         if self._transport.write(frame):
-            self._sent += 1
+            self._health.sent += 1
             self._record(frame)
         else:
-            self._unsent += 1
+            self._health.unsent += 1
 
     def _process_data(self, data: bytes, peer: Peer) -> None:
         remote = self._transport.remote
@@ -332,7 +320,7 @@ class Link:
         elif remote is None:
             self._process_unknown_peer(data, peer)
         else:
-            self._foreign += 1
+            self._health.foreign += 1
             self._process_other_peer(data, peer, is_same_host=peer[0] == remote[0])
 
     def _process_unknown_peer(self, data: bytes, peer: Peer) -> None:
@@ -343,22 +331,22 @@ class Link:
             self._transport.adopt(peer)
             self._queue(messages)
         else:
-            self._foreign += 1
+            self._health.foreign += 1
 
     def _process_other_peer(self, data: bytes, peer: Peer, *, is_same_host: bool) -> None:
         """Adopt the vehicle's new port; otherwise find out whether another vehicle uses its ids."""
         now_s = self._clock.now_s()
-        since_s = self._last_packet_s if self._last_packet_s is not None else self._opened_s
+        since_s = self._health.last_packet_s if self._health.last_packet_s is not None else self._opened_s
         is_gone = now_s - since_s > GONE_AFTER_S
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
                 self._transport.adopt(peer)
-        elif not is_gone and self._last_packet_s is not None and self._others.may_check(peer, now_s):
+        elif not is_gone and self._health.last_packet_s is not None and self._others.may_check(peer, now_s):
             message = next((each for each in self._new_codec().parse(data) if self._poses_as_vehicle(each)), None)
             if message is None:
                 return
             verdict = self._others.add(
-                peer, sequence(message), now_s, last_number=self._last_number, last_s=self._last_packet_s
+                peer, sequence(message), now_s, last_number=self._last_number, last_s=self._health.last_packet_s
             )
             if verdict == "duplicate":
                 self._duplicate_s = now_s
@@ -392,7 +380,7 @@ class Link:
             return
         with self._inbox_changed:
             excess = max(len(self._inbox) + len(fresh) - MAX_QUEUED_MESSAGES, 0)
-            self._overrun += excess
+            self._health.overrun += excess
             self._inbox.extend(fresh)
             for _ in range(excess):
                 self._inbox.popleft()
@@ -401,31 +389,31 @@ class Link:
     def _accepts(self, message: Message, now_s: float) -> bool:
         """Count and record the message; return whether `receive` should return it."""
         if message.get_type() == BAD_DATA:
-            self._bad += 1
+            self._health.bad += 1
             return False
         is_autopilot = self._is_vehicle(message)
         if is_autopilot:
             self._vehicle_system, self._vehicle_component = source_system(message), source_component(message)
         if source_system(message) != self._vehicle_system:
-            self._foreign += 1
+            self._health.foreign += 1
             return False
         frame = bytes(message.get_msgbuf())
         self._losses.count(message.get_type(), source_component(message), sequence(message))
         self._record(frame)
         if not is_known(message):  # neither its checksum nor its signature was checked
             return False
-        self._received += 1
+        self._health.received += 1
         if message.get_type() == self._dialect.plan:
             self._plan[number(message, "seq")] = frame
         if self._vehicle_component in (None, source_component(message)):
-            self._last_packet_s = now_s
+            self._health.last_packet_s = now_s
             counts = not message.get_type().startswith(self._dialect.uncounted)
             self._last_number = sequence(message) if counts else self._last_number
             is_copy = self._duplicates.add(frame, sequence(message), now_s, _boot_s(message), is_counted=counts)
             if is_copy and message.get_type() in _TOLD_ONCE:
                 return False
         if is_autopilot:
-            self._last_heartbeat_s = now_s
+            self._health.last_heartbeat_s = now_s
         return True
 
     def _record(self, frame: bytes) -> None:
@@ -434,8 +422,7 @@ class Link:
             tlog.write(self._opened_unix_us + passed_us, frame)
 
     def _new_codec(self) -> Codec:
-        system, component, key = self._identity
-        return self._dialect.codec(system=system, component=component, signing_key=key)
+        return self._dialect.codec(system=GROUND_STATION, component=_COMPONENT, signing_key=self._signing_key)
 
 
 _GROUND_STATION: Final[dict[str, FieldValue]] = {

@@ -1,5 +1,6 @@
 """A vehicle that is received, identified, and landed or stopped by a person: all that is possible in quarantine."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -30,7 +31,7 @@ _NOT_STOPPED: Final = f"The vehicle has not confirmed within {STOPPING_S:g} s th
 _DROPPED: Final = "The vehicle was not known to be on the ground: inspect it before it flies again."
 
 
-class ObservedVehicle:
+class ObservedVehicle(ABC):
     """One vehicle on one link. A vehicle that is not as expected is only observed from then on."""
 
     def __init__(
@@ -38,14 +39,37 @@ class ObservedVehicle:
         options: Options,
         safe_gains: Gains,
         *,
-        clock: Clock | None,
-        identity: Identity | None,
-        was_flying: bool,
-        source: AltitudeSource | None,
-        transport: Transport | None,
-        on_wait: Callable[[], None],
+        is_real: bool,
+        clock: Clock | None = None,
+        identity: Identity | None = None,
+        observes: bool = False,
+        decided: bool = True,
+        was_flying: bool = False,
+        trial_parameters: Path | None = None,
+        source: AltitudeSource | None = None,
+        transport: Transport | None = None,
+        on_wait: Callable[[], None] = lambda: None,
     ) -> None:
+        """Connect, wait for the vehicle (with a given `identity`, for that one), and write the safe gains once it is
+        known to be disarmed. Unless a person has `decided` on these safe gains for this very vehicle, they are only
+        compared with those that it holds, which may be its owner's; if they differ, nothing is written.
+
+        A vehicle that `was_flying` in a trial when the process that flew it ended gets Land while it is flown as in a
+        trial, and no heartbeats of a ground station until then.
+
+        `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
+        closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
+        `trial_parameters` keeps the parameters that a trial changes in addition to the gains, so that the next
+        connection can restore them if this process dies. `on_wait` is called while waiting for the vehicle on the
+        ground; an exception from it ends the operation.
+
+        With `observes`, a vehicle that is armed or does not hold its safe gains stays connected and is only observed
+        (see `concern`). Otherwise it raises SafeGainsError, and a vehicle that is not ready to fly VehicleError. Raises
+        VehicleError if no vehicle or another one answers, GainsError for safe gains that it cannot hold.
+        """
+        self.is_real: Final = is_real
         self._options = dict(options)
+        self._decided, self._plan_problem, self._parameters_folder = decided, "", trial_parameters
         self._quarantine = Quarantine()
         self._repeated: RepeatedCommand | None = None
         self._is_restoring = False
@@ -60,9 +84,14 @@ class ObservedVehicle:
         self._telemetry_requested_s = self._radio.clock.now_s()
         try:
             self._gains = GainStore(self._radio, safe_gains)
+            self._open(observes=observes)
         except BaseException:
             self._radio.link.close()
             raise
+
+    @abstractmethod
+    def _open(self, *, observes: bool) -> None:
+        """Connect; with `observes`, also to a vehicle that may only be observed."""
 
     @property
     def safe_gains(self) -> Gains:
@@ -107,11 +136,11 @@ class ObservedVehicle:
         if self._secondary is not None:
             self._secondary.source.close()
 
-    def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
-        """Read every parameter; `on_progress` receives how many have arrived, and the total. Raises VehicleError if
-        they do not arrive, SafeGainsError while the vehicle is only observed."""
+    def parameters(self) -> dict[str, float]:
+        """Read every parameter. Raises VehicleError if they do not arrive, SafeGainsError while the vehicle is only
+        observed."""
         self._quarantine.require_none()
-        return parameters.read_all(self._radio, on_progress)
+        return parameters.read_all(self._radio)
 
     # ---- receiving
 

@@ -28,27 +28,6 @@ LIST_ENDS_S: Final = 2.0
 """The list has ended if no parameter has arrived for this long."""
 
 
-def find_gain_set(radio: AutopilotLink) -> GainSet:
-    """Return the gains by the names on this vehicle. Raises VehicleError if it has none of the known names."""
-    for gain_set in radio.profile.gain_sets:
-        if read_parameter(radio, gain_set[0].parameter) is not None:
-            return gain_set
-    tried = ", ".join(gain_set[0].parameter for gain_set in radio.profile.gain_sets)
-    raise VehicleError(
-        f"{FAILURE_TEXTS[Failure.PARAMETER]} It did not reply to requests for {tried}.",
-        hint=f"Check that it runs {radio.profile.title}, and that no other program requests its parameters.",
-    )
-
-
-def write_gains(radio: AutopilotLink, gain_set: GainSet, gains: Gains) -> dict[str, float]:
-    """Write all gains, then return those read back. Raises VehicleError if the vehicle does not reply."""
-    for gain in gain_set:
-        wanted = gain.sent(gains[gain.gain])
-        if write_parameter(radio, gain.parameter, wanted) is None:
-            raise _unconfirmed(gain)
-    return read_gains(radio, gain_set, gains)
-
-
 def read_gains(radio: AutopilotLink, gain_set: GainSet, requested: Gains | None = None) -> dict[str, float]:
     """Return the gains on the vehicle, exactly as in `requested` where they are equal in single precision. Raises
     VehicleError if the vehicle does not reply."""
@@ -83,7 +62,7 @@ def read_loop(radio: AutopilotLink, names: Iterable[str], may_lack: Collection[s
     return {name: value for name, value in read.items() if value is not None}
 
 
-def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[str, float]:
+def read_all(radio: AutopilotLink) -> dict[str, float]:
     """Read all parameters of the vehicle as a list; those that are lost are requested one by one. Raises VehicleError
     if none arrive, or not all."""
     received: dict[int, Parameter] = {}
@@ -91,10 +70,9 @@ def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> d
     for _ in range(LIST_ATTEMPTS):
         if not received:
             radio.send(commands.list_parameters(radio.target))
-            received = _list(radio, on_progress)
+            received = _list(radio)
     for place in [place for place in range(_count(received)) if place not in received]:
         received |= _fetched(radio, place)
-        on_progress(len(received), _count(received))
     if not received or not _is_complete(received):
         raise VehicleError(
             f"Not all of its parameters were received: {len(received)} of {_count(received) or 'an unknown number'}.",
@@ -103,7 +81,7 @@ def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> d
     return {received[place].name: received[place].value for place in sorted(received)}
 
 
-def _list(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[int, Parameter]:
+def _list(radio: AutopilotLink) -> dict[int, Parameter]:
     """Receive the list until it is complete or no more parameters arrive."""
     received: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
@@ -111,7 +89,6 @@ def _list(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict
         if found := _listed(radio.listen(radio.reply_timeout_s)):
             received |= found
             last_s = radio.clock.now_s()
-            on_progress(len(received), _count(received))
     return received
 
 
@@ -247,12 +224,27 @@ class GainStore:
 
     def _found(self) -> GainSet:
         """Return the gains by the names on this vehicle. Raises VehicleError if it has none of the known names."""
-        if self._gain_set is None:
-            self._gain_set = find_gain_set(self._radio)
-        return self._gain_set
+        if self._gain_set is not None:
+            return self._gain_set
+        radio = self._radio
+        for gain_set in radio.profile.gain_sets:
+            if read_parameter(radio, gain_set[0].parameter) is not None:
+                self._gain_set = gain_set
+                return gain_set
+        tried = ", ".join(gain_set[0].parameter for gain_set in radio.profile.gain_sets)
+        raise VehicleError(
+            f"{FAILURE_TEXTS[Failure.PARAMETER]} It did not reply to requests for {tried}.",
+            hint=f"Check that it runs {radio.profile.title}, and that no other program requests its parameters.",
+        )
 
     def _write(self, wanted: Gains) -> dict[str, float]:
-        return self._note(self._radio.seen.restarts, write_gains(self._radio, self._found(), wanted))
+        """Write all gains, then return those read back. Raises VehicleError if the vehicle does not reply."""
+        radio = self._radio
+        restarts, gain_set = radio.seen.restarts, self._found()
+        for gain in gain_set:
+            if write_parameter(radio, gain.parameter, gain.sent(wanted[gain.gain])) is None:
+                raise _unconfirmed(gain)
+        return self._note(restarts, read_gains(radio, gain_set, wanted))
 
     def _note(self, restarts: int, held: dict[str, float]) -> dict[str, float]:
         self._restarts, self.held = restarts, held

@@ -104,9 +104,9 @@ class VehicleMemory:
     """Whether its flight plan was heard to set its ground reference, and it has not restarted since."""
     battery_v: float | None = None
     loop: LoopReports = field(default_factory=LoopReports)
-    may_arm: bool | None = None
     reports_landing: bool = False
     """Whether it has sent its landed state."""
+    may_arm: bool | None = None
     """Whether it reports that it may be armed in its mode; None if it never reports that. One that has done so, or that
     sends events, may not while it reports nothing."""
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)

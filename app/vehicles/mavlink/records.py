@@ -19,13 +19,12 @@ from app.vehicles.base import Ending, OptionValue
 from app.vehicles.flight_end import FlightEnd, GainsLeft
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink.monitors.second_source import MAX_DIFFERENCE_M
 from app.vehicles.mavlink.trial_state import State, Trial
 
 Scored = Literal["vehicle", "mocap"]
 """Source of the scored altitude."""
 
-MAX_DIFFERENCE_M: Final = 0.3
-"""Difference between the sources above which a disagreement is reported."""
 _STEPPED: Final = ("set_point_m", "throttle")
 """Channels that jump: between two samples the first one is held."""
 

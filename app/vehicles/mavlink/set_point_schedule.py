@@ -58,7 +58,7 @@ def note_settling(trial: Trial, positions: tuple[Position, ...]) -> Trial:
 def is_due(trial: Trial, now_s: float) -> bool:
     """Whether the next set point is to be commanded now. While the vehicle has not confirmed the previous one, none
     is; it holds the first one once its climb is over, but no later than it must be at rest."""
-    due_s, first_s = _next_due_s(trial), _first_step_s(trial)
+    due_s, first_s = _time_s(trial, len(trial.set_points.changes) + 1), _first_step_s(trial)
     if due_s is None or first_s is None or trial.set_points.is_changing:
         return False
     elapsed_s = _elapsed_s(trial, now_s)
@@ -86,10 +86,10 @@ def find_unsettled(trial: Trial) -> Finding | None:
 
 def find_overdue(trial: Trial, now_s: float) -> Finding | None:
     """Find that the next step is not confirmed although it was due long ago."""
-    due_s = _next_step_s(trial)
+    due_s = _time_s(trial, max(len(trial.set_points.changes) + 1, trial.plan.first_step))  # None after the last
     if due_s is None or _elapsed_s(trial, now_s) <= due_s + _OVERDUE * trial.plan.limits.late_s:
         return None
-    return _not_confirmed(f"The set point of {due_s:g} s was not confirmed in time.")
+    return Finding(Failure.SET_POINT, f"The set point of {due_s:g} s was not confirmed in time.")
 
 
 def find_late(trial: Trial) -> Finding | None:
@@ -99,17 +99,13 @@ def find_late(trial: Trial) -> Finding | None:
     late_s = changes[-1].times_s[-1] - plan.set_points.times_s[number]
     if number < plan.first_step or late_s <= plan.limits.late_s:
         return None
-    return _not_confirmed(f"A set point took effect {late_s:.1f} s late.")
+    return Finding(Failure.SET_POINT, f"A set point took effect {late_s:.1f} s late.")
 
 
 def find_missing(trial: Trial) -> Finding | None:
     """Find at the end of the record that not every set point was commanded and confirmed."""
     missing = len(trial.plan.set_points.times_s) - 1 - len(trial.set_points.changes)
-    return _not_confirmed(f"The record ended without {count(missing, 'set point')}.") if missing else None
-
-
-def _not_confirmed(why: str) -> Finding:
-    return Finding(Failure.SET_POINT, why)
+    return Finding(Failure.SET_POINT, f"The record ended without {count(missing, 'set point')}.") if missing else None
 
 
 def command_next(trial: Trial) -> Step:
@@ -150,16 +146,6 @@ def _climbs(trial: Trial) -> bool:
 def _first_step_s(trial: Trial) -> float | None:
     """Time of the first step since the takeoff command; None without steps."""
     return _time_s(trial, trial.plan.first_step)
-
-
-def _next_step_s(trial: Trial) -> float | None:
-    """Time of the next step that is not confirmed, since the takeoff command; None after the last."""
-    return _time_s(trial, max(len(trial.set_points.changes) + 1, trial.plan.first_step))
-
-
-def _next_due_s(trial: Trial) -> float | None:
-    """Time of the next set point since the takeoff command; None after the last."""
-    return _time_s(trial, len(trial.set_points.changes) + 1)
 
 
 def _time_s(trial: Trial, number: int) -> float | None:

@@ -73,10 +73,6 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     return _REACTIONS[reaction](trial, now_s)
 
 
-def _lose_link(trial: Trial, now_s: float) -> Step:
-    return land(trial, State.LINK_LOST, now_s)
-
-
 def _give_up_take_off(trial: Trial, now_s: float) -> Step:
     """Stop the motors of a vehicle that has received the command and is on the ground by every source; otherwise abort,
     because it may yet lift off, or has, with its integrator wound up. One that reports its landing by a block of its
@@ -234,7 +230,7 @@ def send_gains(trial: Trial, sent: SafeGainsSent, event: Event) -> Step:
 _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
     "land, gains first": abort,
     "land": _abort_landing,
-    "repeat land": _lose_link,
+    "repeat land": lambda trial, now_s: land(trial, State.LINK_LOST, now_s),
     "disarm": _give_up_take_off,
 }
 """Transition for each reaction of `RESPONSES`, for a vehicle that has been commanded to take off."""

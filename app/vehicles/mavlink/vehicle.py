@@ -25,7 +25,7 @@ from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from app.vehicles.mavlink.set_point_schedule import referred_from_s
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
-from app.vehicles.mavlink.trial_state import Plan, State, Trial
+from app.vehicles.mavlink.trial_state import State, Trial
 
 STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""
@@ -176,9 +176,6 @@ class MavlinkVehicle(VehicleConnection):
         preflight.require((*items, *needed, preflight.evaluate_set_points(order.set_points)))
         return watched.ground
 
-    def _plan(self, ground: Ground) -> Plan:
-        return flight_preparation.plan_on(ground, self._radio, self._options, self._gains)
-
     def _fly(
         self,
         ground: Ground,
@@ -190,7 +187,7 @@ class MavlinkVehicle(VehicleConnection):
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._quarantine.enter(State.ARM)
-        plan = flight_preparation.plan_of(order, self._plan(ground), self._radio)
+        plan = flight_preparation.plan_of(order, ground, self._radio, self._options, self._gains)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(),
@@ -279,5 +276,6 @@ class MavlinkVehicle(VehicleConnection):
     def _not_begun(self, ground: Ground, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
-        trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
+        datum_m = ground.altitude_m if self._radio.profile.climbs_from_ground else 0.0
+        trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, datum_m)
         return FlightRecord(trajectory=trajectory, ending="aborted", end=end, settings=self._options)

@@ -22,7 +22,7 @@ from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.simulated.body import TICK_S, Make
 from app.autopilots.simulated.copter import Copter
 from app.core.policy import Gains
-from app.simdrone.drone import Drone, Lockstep
+from app.simdrone.drone import Drone
 from app.simdrone.motion_capture import open_outlet
 from app.vehicles import registry as open_module
 from app.vehicles.base import Identity, OptionValue
@@ -33,6 +33,7 @@ from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
+from bench.lockstep import Lockstep
 from tests.ports import free_port
 from tests.simdrone.ground import switched_on
 from tests.vehicles.mavlink.speaking import LOOPBACK

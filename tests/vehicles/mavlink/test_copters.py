@@ -327,7 +327,10 @@ class LossyRig(LockstepRig):
     """Loses this share of the drone's packets."""
 
     lost_share = 0.0
-    chance = random.Random(1)
+
+    def __init__(self, autopilot: str) -> None:
+        super().__init__(autopilot)
+        self.chance = random.Random(1)
 
     def arriving(self, frames: list[bytes]) -> list[bytes]:
         return [frame for frame in frames if self.chance.random() >= self.lost_share]
