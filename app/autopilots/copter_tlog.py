@@ -45,7 +45,7 @@ def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
     Raises TrajectoryError naming every message, mode and parameter that is missing, or InputError for a parameter that
     is not supported.
     """
-    autopilot = AUTOPILOTS.get(recording.autopilot)
+    autopilot = AUTOPILOTS.get(recording.autopilot.name)
     return None if autopilot is None else _Reader(name, recording, autopilot).read()
 
 

@@ -8,20 +8,18 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.recording import (
     Event,
     EventKind,
-    GainSets,
-    LoggedGain,
     ParameterHistory,
     Recording,
     Setting,
     Source,
     columns_of,
-    own_names,
     restarts,
 )
-from app.core.control.ardupilot_parameters import GAINS, NEWER_NAMES, in_older_names
+from app.core.control.ardupilot_parameters import in_older_names
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import parameters_in, read_tables
 
@@ -61,12 +59,6 @@ _WANTED: Final = frozenset(
     {"PARM", "MAVC", "EV", "MSG", "PSCZ", *(each.message for each in (*LOOP.values(), *_BESIDE.values()))}
 )
 
-GAIN_SETS: Final[GainSets] = (
-    own_names(*GAINS),
-    tuple(LoggedGain(newer, older, 1.0 / factor) for newer, (older, factor) in NEWER_NAMES.items() if older in GAINS),
-)
-"""Until 4.6, and from 4.7 on."""
-
 _COMMANDS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
     {22: (EventKind.TAKEOFF, "NAV_TAKEOFF"), 21: (EventKind.COMMAND, "NAV_LAND")}
 )
@@ -93,13 +85,10 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
     return Recording(
         title=f"ArduPilot's on-board log, altitude from {altitude}",
-        autopilot="ardupilot",
-        clock="vehicle",
+        autopilot=ARDUPILOT,
         firmware=_other_firmware(tables),
         columns=columns,
-        from_ground=True,
         sources=list(tables),
-        gain_sets=GAIN_SETS,
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
         events=sorted(_events(tables, log.boots_s), key=lambda event: event.time_s),
         notes=restarts(len(log.boots_s)),
