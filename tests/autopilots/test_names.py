@@ -20,11 +20,10 @@ LEFT: Final = {
     "app/core/models": 8,
     "app/core/tuning": 4,
     # Logs of one firmware, until they are read as recordings.
-    "app/controller_checks": 55,
     "app/log_analyses": 5,
     "app/logs": 12,
     # The paper's loop, which the simulated vehicles and reproductions fly, and its command.
-    "app/cli": 6,
+    "app/cli": 5,
     "app/reproductions": 1,
     "app/simdrone": 1,
     "app/vehicles": 6,

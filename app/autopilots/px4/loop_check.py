@@ -7,11 +7,20 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.loop_check import (
+    Kind,
+    LoopCheck,
+    Result,
+    Signal,
+    SignalResult,
+    TraceReplay,
+    Upload,
+    grouped,
+    result_of_trace,
+)
 from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.replica_check import px4_loop_log
 from app.autopilots.px4.trace import is_px4_trace, read_px4_trace
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_replay import LoopTrace, Replay, replayed
@@ -73,11 +82,7 @@ def _examine_log(upload: Upload) -> Result:
 def _examine_trace(upload: Upload) -> Result:
     trace = read_px4_trace(upload.stream, name=upload.name)
     replay = _replayed(trace)
-    return (
-        _judged_by_medians(replay, _MEDIANS, kind="trace")
-        if trace.flown
-        else result_of_trace(PX4.name, _SIGNALS, replay)
-    )
+    return _judged_by_medians(replay, _MEDIANS, kind="trace") if trace.flown else result_of_trace(_SIGNALS, replay)
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -129,7 +134,7 @@ def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
 def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kind: Kind) -> Result:
     """The result of a flight; rows beyond what a median may be are marked, and decide nothing."""
     limited = {name: replace(each, tolerance=medians.get(name, each.tolerance)) for name, each in _SIGNALS.items()}
-    result = result_of_trace(PX4.name, limited, replay, kind=kind)
+    result = result_of_trace(limited, replay, kind=kind)
     signals = tuple(_judged(signal, replay) for signal in result.signals if signal.name in medians)
     differing = [signal.name for signal in signals if signal.verdict == "differs"]
     total = grouped(result.rows)
@@ -162,9 +167,7 @@ def _judged(signal: SignalResult, replay: TraceReplay) -> SignalResult:
     )
 
 
-PX4: Final = Autopilot(
-    name="px4",
-    title="PX4",
+CHECK: Final = LoopCheck(
     recordings="PX4's .ulg log of a flight, or a trace of its vertical loop with one row per estimate of position, "
     ".csv or .csv.gz",
     signals=_SIGNALS,

@@ -1,17 +1,18 @@
-"""Result of a check as plain data for storage: sentences, one line for each signal, and curves."""
+"""A recorded control loop compared with its replica, as plain data for storage: sentences, one line for each signal,
+and curves; and what the check must know of an autopilot."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import BinaryIO, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.core.control.loop_log import Overlay
-from app.core.records.trajectory import Samples
-from app.figures.panels import Overlaid
-from app.figures.scale import thinned
+from app.core.records.overlaid import Overlaid
+from app.core.records.trajectory import Samples, select_samples
+from app.logs.formats import Format
 
 Kind = Literal["log", "trace"]
 Verdict = Literal["exact", "agrees", "differs"]
@@ -88,6 +89,36 @@ class Result:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Upload:
+    """A file to examine: its content and name, the file that was written beside it, and gains that a person gave."""
+
+    stream: BinaryIO
+    name: str
+    companion: BinaryIO | None = None
+    given: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopCheck:
+    """The check of an autopilot whose vertical loop has a replica.
+
+    `recordings` completes the sentence “Give …”; `figures` holds a title and the signals one below another for each
+    figure that its recordings have; `note` is what a reader of its signals must know. `log` is the format of its own
+    log; `is_trace` says whether a file with these first bytes is a recorded run of its loop. `examine_log`
+    and `examine_trace` compare them with the replica and raise InputError that names what cannot be read.
+    """
+
+    recordings: str
+    signals: Signals
+    figures: Mapping[FigureName, tuple[str, tuple[str, ...]]]
+    note: str
+    log: Format
+    is_trace: Callable[[bytes], bool]
+    examine_log: Callable[[Upload], Result]
+    examine_trace: Callable[[Upload], Result]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TraceReplay:
     """A trace and what the replica computed from the same inputs.
 
@@ -102,7 +133,7 @@ class TraceReplay:
     notes: tuple[str, ...] = field(default=())
 
 
-def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
+def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
     """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
     apart = {name: _apart(replay.recorded[name], replay.replica[name]) for name in replay.recorded}
     differs = {name: ~(values <= signals[name].tolerance) for name, values in apart.items()}
@@ -123,7 +154,6 @@ def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay, *, ki
         notes=replay.notes,
         signals=results,
         curves=curves(signals, (overlay,)),
-        autopilot=autopilot,
         first_different_row=int(rows[0]) if rows.size else None,
     )
 
@@ -216,4 +246,4 @@ def _rounded(values: Samples) -> tuple[float, ...]:
 
 
 def _kept(values: Samples) -> list[int]:
-    return [int(place) for place in thinned(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)[0]]
+    return [int(place) for place in select_samples(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)]

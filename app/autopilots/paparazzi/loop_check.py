@@ -7,18 +7,19 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
-from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.results import (
+from app.autopilots.loop_check import (
+    LoopCheck,
     Result,
     Signal,
     TraceReplay,
+    Upload,
     curves,
     grouped,
     result_of_trace,
     signal_result,
 )
+from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
+from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
 from app.core.control.loop_log import (
     COMMANDS,
     GAINS,
@@ -147,7 +148,7 @@ def _examine_log(upload: Upload) -> Result:
 
 def _examine_trace(upload: Upload) -> Result:
     trace = read_loop_trace_stream(upload.stream, name=upload.name)
-    return result_of_trace(PAPARAZZI.name, _SIGNALS, _replayed(trace))
+    return result_of_trace(_SIGNALS, _replayed(trace))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -194,7 +195,6 @@ def _result_of_log(checked: LogCheck) -> Result:
         notes=(*_notes(checked), _DOWN),
         signals=tuple(signals),
         curves=curves(_SIGNALS, checked.overlays),
-        autopilot=PAPARAZZI.name,
     )
 
 
@@ -247,9 +247,7 @@ def _notes_on(commands: CommandCheck) -> Iterable[str]:
             yield f"Commands reproduced only with the {fields} one step apart: {grouped(count)}."
 
 
-PAPARAZZI: Final = Autopilot(
-    name="paparazzi",
-    title="Paparazzi",
+CHECK: Final = LoopCheck(
     recordings="the .data file of Paparazzi's ground log with VERT_LOOP messages, together with its .log, or a trace "
     "with one row per step of 1/512 s",
     signals=_SIGNALS,

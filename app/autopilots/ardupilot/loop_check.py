@@ -9,8 +9,7 @@ import numpy as np
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
+from app.autopilots.loop_check import LoopCheck, Result, Signal, TraceReplay, Upload, grouped, result_of_trace
 from app.core.control.ardupilot import OUTPUTS
 from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
 from app.core.control.ardupilot_replay import LoopTrace, replayed
@@ -42,11 +41,11 @@ _UP: Final = "Altitude, climb rate and acceleration are positive up."
 
 def _examine_log(upload: Upload) -> Result:
     compared = _compared(ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name))
-    return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
+    return result_of_trace(_SIGNALS, compared, kind="log")
 
 
 def _examine_trace(upload: Upload) -> Result:
-    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(upload.stream, name=upload.name)))
+    return result_of_trace(_SIGNALS, _replayed(read_ardupilot_trace(upload.stream, name=upload.name)))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -84,9 +83,7 @@ def _notes(comparison: LogComparison) -> Iterable[str]:
         yield "The demanded throttle was not computed: the log has no PIDA and CTUN beside PSCD."
 
 
-ARDUPILOT: Final = Autopilot(
-    name="ardupilot",
-    title="ArduCopter",
+CHECK: Final = LoopCheck(
     recordings="ArduCopter's .bin log of a flight in GUIDED, or a trace of its vertical loop with one row per step, "
     ".csv or .csv.gz",
     signals=_SIGNALS,
