@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.core.analysis import ardupilot_loop, px4_loop
+from app.autopilots.ardupilot import loop as ardupilot_loop
+from app.autopilots.px4 import loop as px4_loop
 from app.core.control import ardupilot_parameters, px4_parameters
 
 

@@ -14,7 +14,7 @@ HOME: Final = re.compile(r"app\.autopilots\.\w+")
 
 LEFT: Final = {
     # The replicas, and what is built of them: vertical.py and horizontal.py of each folder, once they move there.
-    "app/core/analysis": 51,
+    "app/core/analysis": 4,
     "app/core/control": 13,
     "app/core/experiments": 7,
     "app/core/models": 8,
