@@ -2,7 +2,7 @@
 and curves; and what the check must know of an autopilot."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import BinaryIO, Final, Literal
 
@@ -25,21 +25,21 @@ CURVE_POINTS: Final = 1000
 MARKS: Final = 200
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Signal:
     """A signal of a loop. `scale` converts its recorded values to `unit`, in which it is drawn with `digits` decimals.
 
-    Differences are in `difference_unit`, as recorded; in a trace they may be at most `tolerance`, which `allowance`
-    describes.
+    Differences are in `difference_unit`, as recorded, by default `unit`; in a trace they may be at most `tolerance`,
+    which `allowance` describes.
     """
 
     title: str
     unit: str
     digits: int
-    difference_unit: str
-    scale: float = 1.0
     tolerance: float = 0.0
     allowance: str = "compared bit for bit"
+    difference_unit: str = ""
+    scale: float = 1.0
 
 
 Signals = Mapping[str, Signal]
@@ -132,6 +132,13 @@ class TraceReplay:
     gains: Mapping[str, float] | None
     notes: tuple[str, ...] = field(default=())
 
+    @property
+    def compared(self) -> "TraceReplay":
+        """Of the signals that have a value in any row."""
+        names = [name for name, values in self.recorded.items() if np.isfinite(values).any()]
+        recorded, replica = ({name: values[name] for name in names} for values in (self.recorded, self.replica))
+        return replace(self, recorded=recorded, replica=replica)
+
 
 def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
     """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
@@ -158,26 +165,16 @@ def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trac
     )
 
 
-def signal_result(
-    name: str,
-    signal: Signal,
-    overlay: Overlay,
-    *,
-    largest_difference: float,
-    tolerance: float | None = None,
-    difference_unit: str | None = None,
-    allowance: str | None = None,
-) -> SignalResult:
-    """Result of one signal; the last three replace those of `signal`."""
+def signal_result(name: str, signal: Signal, overlay: Overlay, *, largest_difference: float) -> SignalResult:
     wrong = np.flatnonzero(overlay.differs[name])
     verdict: Verdict = "differs" if wrong.size else "exact" if largest_difference == 0.0 else "agrees"
     return SignalResult(
         name=name,
         title=signal.title,
         largest_difference=largest_difference,
-        difference_unit=difference_unit or signal.difference_unit,
-        tolerance=signal.tolerance if tolerance is None else tolerance,
-        allowance=allowance or signal.allowance,
+        difference_unit=signal.difference_unit or signal.unit,
+        tolerance=signal.tolerance,
+        allowance=signal.allowance,
         verdict=verdict,
         different=int(wrong.size),
         first_different_s=round(float(overlay.time_s[wrong[0]]), 6) if wrong.size else None,

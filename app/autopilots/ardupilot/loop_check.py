@@ -18,22 +18,16 @@ from app.logs.formats import Format
 _PRECISION: Final = "firmware and recording have single precision"
 
 
-def _signal(title: str, unit: str, digits: int, tolerance: float) -> Signal:
-    return Signal(
-        title=title, unit=unit, difference_unit=unit, digits=digits, tolerance=tolerance, allowance=_PRECISION
-    )
-
-
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     {
-        "z_d_m": _signal("Desired altitude", "m", 3, 1e-4),
-        "v_d_m_s": _signal("Desired climb rate", "m/s", 3, 1e-4),
-        "a_d_m_s2": _signal("Desired acceleration", "m/s²", 3, 3e-4),
-        "v_t_m_s": _signal("Climb rate target", "m/s", 3, 1e-4),
-        "a_t_m_s2": _signal("Acceleration target", "m/s²", 3, 5e-4),
-        "i_term_permille": _signal("Integrator of the acceleration controller", "‰ of throttle", 1, 0.14),
-        "throttle": _signal("Demanded throttle", "of full", 4, 5e-4),
-        "throttle_filtered": _signal("Filtered throttle", "of full", 4, 5e-4),
+        "z_d_m": Signal("Desired altitude", "m", 3, 1e-4, _PRECISION),
+        "v_d_m_s": Signal("Desired climb rate", "m/s", 3, 1e-4, _PRECISION),
+        "a_d_m_s2": Signal("Desired acceleration", "m/s²", 3, 3e-4, _PRECISION),
+        "v_t_m_s": Signal("Climb rate target", "m/s", 3, 1e-4, _PRECISION),
+        "a_t_m_s2": Signal("Acceleration target", "m/s²", 3, 5e-4, _PRECISION),
+        "i_term_permille": Signal("Integrator of the acceleration controller", "‰ of throttle", 1, 0.14, _PRECISION),
+        "throttle": Signal("Demanded throttle", "of full", 4, 5e-4, _PRECISION),
+        "throttle_filtered": Signal("Filtered throttle", "of full", 4, 5e-4, _PRECISION),
     }
 )
 _UP: Final = "Altitude, climb rate and acceleration are positive up."
@@ -62,14 +56,13 @@ def _replayed(trace: LoopTrace) -> TraceReplay:
 
 def _compared(log: LoopLog) -> TraceReplay:
     comparison = compare_log(log)
-    compared = {name: values for name, values in comparison.recorded.items() if np.isfinite(values).any()}
     return TraceReplay(
         time_s=log.time_s - log.time_s[0],
-        recorded=compared,
-        replica={name: comparison.replica[name] for name in compared},
+        recorded=comparison.recorded,
+        replica=comparison.replica,
         gains=log.parameters.gains,
         notes=(*_notes(comparison), _UP),
-    )
+    ).compared
 
 
 def _notes(comparison: LogComparison) -> Iterable[str]:

@@ -29,23 +29,16 @@ from app.core.records.trajectory import Samples
 from app.logs.formats import Format
 
 _TOLERANCE: Final = 1e-5
-
-
-def _signal(title: str, unit: str, digits: int) -> Signal:
-    allowance = "firmware and replica compute in single precision"
-    return Signal(
-        title=title, unit=unit, difference_unit=unit, digits=digits, tolerance=_TOLERANCE, allowance=allowance
-    )
-
+_PRECISION: Final = "firmware and replica compute in single precision"
 
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     {
-        "takeoff_state": _signal("State of the takeoff", "", 0),
-        "out_vz_m_s": _signal("Velocity target", "m/s", 3),
-        "out_az_m_s2": _signal("Acceleration target", "m/s²", 3),
-        "out_thrust": _signal("Thrust", "of full", 4),
-        "ramp_m_s": _signal("Limit of the climb rate", "m/s", 3),
-        "out_vz_derivative": _signal("Derivative of the velocity", "m/s²", 3),
+        "takeoff_state": Signal("State of the takeoff", "", 0, _TOLERANCE, _PRECISION),
+        "out_vz_m_s": Signal("Velocity target", "m/s", 3, _TOLERANCE, _PRECISION),
+        "out_az_m_s2": Signal("Acceleration target", "m/s²", 3, _TOLERANCE, _PRECISION),
+        "out_thrust": Signal("Thrust", "of full", 4, _TOLERANCE, _PRECISION),
+        "ramp_m_s": Signal("Limit of the climb rate", "m/s", 3, _TOLERANCE, _PRECISION),
+        "out_vz_derivative": Signal("Derivative of the velocity", "m/s²", 3, _TOLERANCE, _PRECISION),
     }
 )
 _MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
@@ -86,17 +79,14 @@ def _examine_trace(upload: Upload) -> Result:
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
-    recorded = dict(zip(OUTPUTS, trace.outputs.T, strict=True))
     replay = replayed(trace)
-    computed = dict(zip(OUTPUTS, replay.outputs.T, strict=True))
-    compared = [name for name, values in recorded.items() if not np.isnan(values).all()]
     return TraceReplay(
         time_s=trace.time_s,
-        recorded={name: recorded[name] for name in compared},
-        replica={name: computed[name] for name in compared},
+        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
+        replica=dict(zip(OUTPUTS, replay.outputs.T, strict=True)),
         gains=trace.parameters.gains,
         notes=(*_order_notes(replay), _DOWN),
-    )
+    ).compared
 
 
 def _order_notes(replay: Replay) -> Iterable[str]:
@@ -110,15 +100,14 @@ def _order_notes(replay: Replay) -> Iterable[str]:
 def _compared(log: LoopLog) -> TraceReplay:
     replica = replica_of(log)
     recorded = {name: np.where(np.isfinite(replica[name]), getattr(log, name), np.nan) for name in COMPARED}
-    compared = [name for name in COMPARED if np.isfinite(recorded[name]).any()]
     time_s = log.time_s[log.place]
     return TraceReplay(
         time_s=time_s - time_s[0],
-        recorded={name: recorded[name] for name in compared},
-        replica={name: replica[name] for name in compared},
+        recorded=recorded,
+        replica=replica,
         gains=log.parameters.gains,
         notes=(*_log_notes(recorded), _DOWN),
-    )
+    ).compared
 
 
 def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
