@@ -70,7 +70,7 @@ _EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
         28: (EventKind.LIFT_OFF, "lift-off"),
     }
 )
-_MODES: Final[Mapping[float, str]] = MappingProxyType(
+MODES: Final[Mapping[float, str]] = MappingProxyType(
     {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
 )
 _OTHER_FIRMWARE: Final = re.compile(rb"(ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V\d")
@@ -110,7 +110,7 @@ def _events(tables: Mapping[str, Table], boots_s: Sequence[float]) -> Iterator[E
     modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
     for (_, before), (time_s, mode) in pairwise(modes):
         if mode != before:
-            yield Event(EventKind.MODE, time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
+            yield Event(EventKind.MODE, time_s, f"the mode {MODES.get(mode, f'{mode:g}')}")
     for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id"):
         if event in _EVENTS:
             yield Event(_EVENTS[event][0], time_s, _EVENTS[event][1])
