@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 from app.autopilots import commands, mavlink
@@ -94,6 +94,8 @@ class Autopilot:
 
     name: str
     title: str
+    project: str = ""
+    """Its project, of which logs may be of other vehicles too, if that has another name."""
     experiments: tuple[Experiment, ...]
     """Experiments that tune its gains, the default first."""
     dialect: Dialect
@@ -149,6 +151,10 @@ class Autopilot:
 
     gain_sets: tuple[GainSet, ...]
     """The gains by their names in the releases of the autopilot, newest last; in the order of its experiment."""
+    logs_own_names: bool = False
+    """Whether recordings have the gains by their names here, rather than by those of the releases."""
+    sends_integers_bytewise: bool = False
+    """Whether the value of an integer parameter is its four bytes, in place of a float."""
     parameter_component: int = AUTOPILOT
     """Component that a PARAM_SET names. Some vehicles, such as MAVSDK's, ignore one to all components (0)."""
     loop_parameters: tuple[tuple[str, ...], ...] = ()
@@ -201,6 +207,13 @@ class Autopilot:
 
     simulated: Callable[[], tuple[SimulatedKind, ...]] = lambda: ()
     """Loads its simulated counterparts, the default first."""
+
+    @property
+    def logged_gains(self) -> tuple[GainSet, ...]:
+        """The gains by their names in recordings."""
+        if not self.logs_own_names:
+            return self.gain_sets
+        return tuple(tuple(replace(gain, parameter=gain.gain) for gain in gains) for gains in self.gain_sets)
 
     def measure(self, message: Message) -> Measurement | None:
         """Read a message; None if it contains no measurement."""

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.core.analysis import ardupilot_loop, px4_loop
+from app.autopilots.ardupilot import loop as ardupilot_loop
+from app.autopilots.ardupilot.log import MODES
+from app.autopilots.px4 import loop as px4_loop
 from app.core.control import ardupilot_parameters, px4_parameters
 
 
@@ -22,7 +24,7 @@ class CopterAutopilot:
 
     number_of_mode: Callable[[int], int]
     mode: int
-    modes: Mapping[int, str]
+    modes: Mapping[float, str]
     messages: Sequence[str]
     bounds: Mapping[str, tuple[float, float]]
     required: Sequence[str]
@@ -58,9 +60,7 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
         "ardupilot": CopterAutopilot(
             number_of_mode=lambda mode: mode,
             mode=4,
-            modes=MappingProxyType(
-                {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
-            ),
+            modes=MODES,
             messages=("LOCAL_POSITION_NED", "NAV_CONTROLLER_OUTPUT", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
             bounds=ardupilot_loop.SPACE.bounds,
             required=(*ardupilot_loop.SPACE.bounds, _LEARNED),

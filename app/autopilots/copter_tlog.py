@@ -10,20 +10,15 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot
 from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
 from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
+from app.autopilots.px4.recorded_flight import px4_loop, read_px4
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
 from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, require_gains
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.recorded_flight import (
-    LARGEST_INTERVAL_S,
-    Steps,
-    ardupilot_loop,
-    px4_loop,
-    read_ardupilot,
-    read_px4,
-)
+from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
 from app.core.analysis.segment import LEAD_S
 from app.core.control.ardupilot_parameters import NEWER_NAMES, in_newer_names, in_older_names
 from app.core.errors import Problem, TrajectoryError
@@ -45,7 +40,7 @@ def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
     Raises TrajectoryError naming every message, mode and parameter that is missing, or InputError for a parameter that
     is not supported.
     """
-    autopilot = AUTOPILOTS.get(recording.autopilot)
+    autopilot = AUTOPILOTS.get(recording.autopilot.name)
     return None if autopilot is None else _Reader(name, recording, autopilot).read()
 
 

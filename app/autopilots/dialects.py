@@ -96,6 +96,11 @@ class Dialect:
     """Name of the message that describes an item, numbered `seq`, of the plan that the vehicle's commands refer to."""
 
     @property
+    def library(self) -> ModuleType:
+        """Loaded when it is first used, because a dialect contains a thousand classes."""
+        return _load(self.module)
+
+    @property
     def can_sign(self) -> bool:
         return self.mavlink >= 2
 

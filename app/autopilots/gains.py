@@ -38,6 +38,10 @@ class GainParameter:
             requested if requested is not None and wire == self.sent(requested) else float(f"{wire / self.factor:.7g}")
         )
 
+    def logged(self, value: float) -> float:
+        """Return the gain for a value in a log: as it is there, or if it has a factor to seven digits."""
+        return value if self.factor == 1.0 else self.read(value)
+
     def refusal(self, value: float) -> str | None:
         """Return why this value may not be written, or None if it may."""
         if not self.lower <= value <= self.upper:

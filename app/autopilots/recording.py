@@ -14,6 +14,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.autopilot import Autopilot
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
@@ -69,27 +70,6 @@ class Setting:
     name: str
     value: float
     held_before: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class LoggedGain:
-    """A gain of an experiment by its name in the log, with the `factor` from the gain to the value in the log."""
-
-    name: str
-    gain: str
-    factor: float = 1.0
-
-    def value(self, logged: float) -> float:
-        """The gain for a value in the log, to the seven digits of single precision."""
-        return logged if self.factor == 1.0 else float(f"{logged / self.factor:.7g}")
-
-
-GainSets = Sequence[Sequence[LoggedGain]]
-
-
-def own_names(*names: str) -> Sequence[LoggedGain]:
-    """Gains that have the same names and units in the log."""
-    return tuple(LoggedGain(name, name) for name in names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,27 +167,23 @@ class ParameterHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """A recording of one vehicle, `system` in MAVLink, under an `autopilot`: ardupilot, px4, paparazzi.
+    """A recording of one vehicle, `system` in MAVLink, under an `autopilot`.
 
     `firmware` and `frame` are named if they are not those of a copter with several rotors. `sources` are the messages
-    that it has, of which some are columns. `from_ground`: its altitude is to be measured from where the vehicle stood.
-    `gain_sets` are the gains of its autopilot by the names of each release; the
-    first set whose names are all in `settings` applies. `in_air` are the intervals from lift-off to touchdown, `armed`
+    that it has, of which some are columns. `in_air` are the intervals from lift-off to touchdown, `armed`
     those with the motors armed, both as reported by the autopilot and in order; None if it does not report them.
     `blocks` are the intervals in blocks of a flight plan, each from the command that activated it. `notes` say what was
     lost or damaged, and `remarks` how takeoffs are found for want of a message.
     """
 
     title: str
-    autopilot: str
-    clock: str
+    autopilot: Autopilot
+    clock: str = "vehicle"
     system: int = 1
     firmware: str = ""
     frame: str = ""
     columns: Mapping[str, Column]
-    from_ground: bool
     sources: Collection[str] = ()
-    gain_sets: GainSets = ()
     settings: Sequence[Setting] = ()
     has_all_parameters: bool = True
     events: Sequence[Event] = ()
@@ -232,11 +208,6 @@ class Recording:
 def refusal(happened: str, hint: str, notes: Sequence[str] = (), error: type[InputError] = TrajectoryError) -> Refused:
     """Errors of a log in which this happened, with `notes` after each reason."""
     return lambda field, reason: error(happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),))
-
-
-def names_in(sets: GainSets) -> frozenset[str]:
-    """All names in these sets, as in the log."""
-    return frozenset(gain.name for gains in sets for gain in gains)
 
 
 def restarts(boots: int) -> list[str]:

@@ -246,8 +246,9 @@ class _GainsAt:
 
     def __init__(self, log: Recording, at_s: float) -> None:
         known = {setting.name for setting in log.settings}
-        logged = next((gains for gains in log.gain_sets if known.issuperset(gain.name for gain in gains)), ())
-        names = [gain.name for gain in logged]
+        sets = log.autopilot.logged_gains
+        logged = next((gains for gains in sets if known.issuperset(gain.parameter for gain in gains)), ())
+        names = [gain.parameter for gain in logged]
         settings = sorted((each for each in log.settings if each.name in names), key=lambda each: each.time_s)
         gains: dict[str, float] = {}
         for each in settings:
@@ -257,7 +258,7 @@ class _GainsAt:
         for each in settings:
             gains.setdefault(each.name, each.value)
         is_known = not any(map(np.isnan, gains.values()))
-        self.gains: Gains = {gain.gain: gain.value(gains[gain.name]) for gain in logged if is_known}
+        self.gains: Gains = {gain.gain: gain.logged(gains[gain.parameter]) for gain in logged if is_known}
         self.changes = [
             Event(
                 EventKind.PARAMETER,
@@ -281,7 +282,7 @@ class _Record:
     held: _GainsAt
 
     def takeoff(self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: slice) -> Takeoff:
-        ground_m = self.ground_m if self.log.from_ground else 0.0
+        ground_m = self.ground_m if self.log.autopilot.climbs_from_ground else 0.0
         cut = {name: values[kept] - (ground_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
         complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
         notes = (*self.log.notes, *self.log.remarks, *self._notes([name for name in cut if name not in complete]))
@@ -296,7 +297,7 @@ class _Record:
                 clock=self.log.clock,
             ),
             gains=self.held.gains,
-            gain_names=tuple(gain.gain for gain in next(iter(self.log.gain_sets), ())),
+            gain_names=tuple(gain.gain for gain in self.log.autopilot.gain_sets[0]),
             notes=notes,
             is_commanded=self.is_commanded,
         )
@@ -304,7 +305,7 @@ class _Record:
     def _notes(self, left_out: Sequence[str]) -> Iterator[str]:
         if not self.is_commanded:
             yield NOT_COMMANDED
-        if self.log.from_ground:
+        if self.log.autopilot.climbs_from_ground:
             yield f"altitude relative to the ground, which is at {self.ground_m:.2f} m in the log"
         if self.held.learned_late:
             yield f"known only after the takeoff: {', '.join(self.held.learned_late)}"

@@ -16,6 +16,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.gains import GainParameter
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
     Event,
@@ -25,7 +26,6 @@ from app.autopilots.recording import (
     Source,
     Span,
     columns_of,
-    names_in,
     restarts,
     spans_of,
 )
@@ -72,7 +72,7 @@ def read_tlog(stream: BinaryIO) -> Recording:
     heartbeat of a known autopilot."""
     data = contents(stream)
     decoder = _Decoder(find_vehicle(data))
-    for message in messages(data, decoder.vehicle.autopilot.dialect, {*decoder.reports, *decoder.requests}):
+    for message in messages(data, decoder.vehicle.autopilot.dialect.library, {*decoder.reports, *decoder.requests}):
         decoder.take(message)
     return decoder.recording()
 
@@ -108,6 +108,7 @@ class _Decoder:
     vehicle: LoggedVehicle
     reports: Mapping[str, Callable[[Message], None]] = field(init=False)
     requests: Mapping[str, Callable[[Message], None]] = field(init=False)
+    _gains: Mapping[str, GainParameter] = field(init=False)
     _clock: _Clock = field(default_factory=_Clock)
     _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(_numbers))
     _blocks: dict[int, str] = field(default_factory=dict)
@@ -127,6 +128,7 @@ class _Decoder:
     """Whether the last position target for it has more than a position, which it does not report."""
 
     def __post_init__(self) -> None:
+        self._gains = {gain.parameter: gain for gains in self.vehicle.autopilot.gain_sets for gain in gains}
         self.reports = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._position,
@@ -169,15 +171,12 @@ class _Decoder:
             self._events.append(Event(kind, time_s, f"the block {name}" if name else f"block {number}"))
         tables = {name: _table(name, values) for name, values in self._reports.items()}
         return Recording(
-            title=f"MAVLink log of {autopilot.title}",
-            autopilot=autopilot.name,
-            clock="vehicle",
+            title=f"MAVLink log of {autopilot.project or autopilot.title}",
+            autopilot=autopilot,
             system=self.vehicle.system,
             frame=self.vehicle.other_frame,
             columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
-            from_ground=autopilot.from_ground,
             sources=list(tables),
-            gain_sets=autopilot.gain_sets,
             settings=self._settings,
             has_all_parameters=0 < self._parameters <= len(self._known),
             events=[*self._events, *self._clock.restarts],
@@ -209,7 +208,7 @@ class _Decoder:
 
     def _mode_changed(self, mode: int) -> None:
         main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
-        if not self.vehicle.autopilot.has_takeoff_mode or main != 4 or sub not in (_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE):
+        if not self.vehicle.autopilot.hovering_modes or main != 4 or sub not in (_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE):
             self._events.append(Event(EventKind.MODE, self._clock.now_s, f"mode {sub or mode}"))
         elif sub == _PX4_TAKEOFF_MODE:
             self._events.append(Event(EventKind.TAKEOFF, self._clock.now_s, "takeoff mode"))
@@ -252,15 +251,15 @@ class _Decoder:
                 del self._asked[name]
 
     def _name(self, message: Message) -> str:
-        """The parameter, by the name that it has in the gain sets if it is a gain."""
+        """The parameter, by its name in recordings."""
         name = message.text("param_id")
-        return (self.vehicle.autopilot.parameters or {}).get(name, name)
+        return self._gains[name].gain if self.vehicle.autopilot.logs_own_names and name in self._gains else name
 
     def _parameter_asked(self, message: Message) -> None:
-        name, value, autopilot = self._name(message), message["param_value"], self.vehicle.autopilot
+        name, value, gain = self._name(message), message["param_value"], self._gains.get(message.text("param_id"))
         self._written.add(name)
-        if name in names_in(autopilot.gain_sets) and message.system != self.vehicle.system and np.isfinite(value):
-            self._asked[name] = float(int(value)) if autopilot.keeps_whole_numbers else value
+        if gain is not None and message.system != self.vehicle.system and np.isfinite(value):
+            self._asked[name] = float(int(value)) if gain.whole else value
 
     def _position_asked(self, message: Message) -> None:
         if message["target_system"] == self.vehicle.system:
@@ -274,7 +273,7 @@ class _Decoder:
     def _command(self, message: Message) -> None:
         number = int(message["command"])
         takes_off = number == _TAKEOFF or (
-            number == _SET_MODE and self.vehicle.autopilot.has_takeoff_mode and message["param3"] == _PX4_TAKEOFF_MODE
+            number == _SET_MODE and self.vehicle.autopilot.hovering_modes and message["param3"] == _PX4_TAKEOFF_MODE
         )
         if number in _COMMANDS and not (number == _MOTORS and message["param1"]):
             kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND

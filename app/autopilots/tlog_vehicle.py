@@ -1,17 +1,13 @@
-"""The vehicle that a telemetry log (.tlog) is of, and what its autopilot does differently from others."""
+"""The vehicle that a telemetry log (.tlog) is of."""
 
-import importlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Final
 
-from app.autopilots.ardupilot.log import GAIN_SETS as ARDUPILOT_SETS
-from app.autopilots.paparazzi.log import GAIN_SETS as PAPARAZZI_SETS
-from app.autopilots.paparazzi.log import PARAMETERS
-from app.autopilots.px4.log import GAIN_SETS as PX4_SETS
-from app.autopilots.recording import GainSets
+from app.autopilots.autopilot import Autopilot
+from app.autopilots.registry import AUTOPILOTS
 from app.logs.base import Contents, refused
 from app.logs.tlog import frames, messages
 
@@ -27,58 +23,8 @@ _OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoggedAutopilot:
-    """Differences between autopilots.
-
-    `parameters` maps their parameter names to those of the gains, where these differ. Some store gains as integers
-    only; some send integers byte by byte in place of a float; some have a takeoff mode.
-    """
-
-    name: str
-    title: str
-    dialect_module: str
-    gain_sets: GainSets
-    parameters: Mapping[str, str] | None = None
-    from_ground: bool = True
-    keeps_whole_numbers: bool = False
-    sends_integers_bytewise: bool = False
-    has_takeoff_mode: bool = False
-
-    @property
-    def dialect(self) -> ModuleType:
-        """Loaded when the first log of such a vehicle is read, because a dialect contains a thousand classes."""
-        return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
-
-
-_AUTOPILOTS: Final[Mapping[int, LoggedAutopilot]] = MappingProxyType(
-    {
-        9: LoggedAutopilot(
-            name="paparazzi",
-            title="Paparazzi",
-            dialect_module="v10.paparazzi",
-            gain_sets=PAPARAZZI_SETS,
-            parameters=PARAMETERS,
-            from_ground=False,
-            keeps_whole_numbers=True,
-        ),
-        3: LoggedAutopilot(
-            name="ardupilot", title="ArduPilot", dialect_module="v20.ardupilotmega", gain_sets=ARDUPILOT_SETS
-        ),
-        12: LoggedAutopilot(
-            name="px4",
-            title="PX4",
-            dialect_module="v20.common",
-            gain_sets=PX4_SETS,
-            sends_integers_bytewise=True,
-            has_takeoff_mode=True,
-        ),
-    }
-)
-"""By the autopilot number in the heartbeat.
-
-Paparazzi's altitude is above its local origin, that of the others above the ground.
-"""
+_AUTOPILOTS: Final = {each.autopilot: each for each in AUTOPILOTS.values()}
+"""By the autopilot number in the heartbeat."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +33,7 @@ class LoggedVehicle:
 
     system: int
     component: int
-    autopilot: LoggedAutopilot
+    autopilot: Autopilot
     kind: int
 
     @property
@@ -108,7 +54,7 @@ def find_vehicle(data: Contents) -> LoggedVehicle:
         if autopilot is not None and place not in found:
             found[place] = LoggedVehicle(*place, autopilot, int(message["type"]))
     if not found:
-        known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
+        known = ", ".join(autopilot.project or autopilot.title for autopilot in _AUTOPILOTS.values())
         raise refused(f"contains no MAVLink heartbeat of {known}", HINT)
     positions = Counter(
         (frame.system, frame.component) for frame in frames(data) if frame.message == _LOCAL_POSITION_NED

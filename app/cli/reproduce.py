@@ -14,12 +14,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from app.autopilots.loop_check import Result as CheckResult
+from app.autopilots.loop_checks import CHECKS, autopilot_of, examine_file
 from app.autopilots.paparazzi.log import read_paparazzi
+from app.autopilots.paparazzi.loop_check import LogCheck, check_log, parse_gains
+from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
-from app.controller_checks.check import AUTOPILOTS, autopilot_of, examine_file
-from app.controller_checks.paparazzi import PAPARAZZI, LogCheck, check_log, parse_gains
-from app.controller_checks.results import Result as CheckResult
 from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
 from app.core.formatting import format_gains
 from app.reproductions.controller import run_controller
@@ -99,8 +100,10 @@ def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
             checked[file] = examine_file(file)
         except InputError as error:
             show_error(error)
-    for (name, autopilot), (difference, differences) in product(AUTOPILOTS.items(), _DIFFERENCES.items()):
-        if own := {file: each for file, each in checked.items() if each.autopilot == name and differences(each)}:
+    for autopilot, (difference, differences) in product(CHECKS, _DIFFERENCES.items()):
+        if own := {
+            file: each for file, each in checked.items() if each.autopilot == autopilot.name and differences(each)
+        }:
             title = f"{autopilot.title}: {difference} between recording and replica"
             console(json_out).print(_replays_table(title, differences, own))
     write_json(json_out, {"files": [_replay_document(file, each) for file, each in checked.items()]})

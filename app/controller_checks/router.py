@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
+from app.autopilots.loop_check import FigureName
 from app.common.schemas import FigureCard, Page, figure_card
 from app.controller_checks import service
-from app.controller_checks.results import FigureName
 from app.controller_checks.service import ControllerCheck, ControllerCheckSummary
 from app.web.dependencies import (
     REQUEST_BODY,

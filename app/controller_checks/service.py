@@ -8,10 +8,10 @@ from pydantic import Field, TypeAdapter
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, undefer
 
+from app.autopilots.loop_check import FigureName, LoopCheck, Result
+from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import NotFoundError, StorageError
 from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, uploaded_name
-from app.controller_checks.autopilot import Autopilot
-from app.controller_checks.results import FigureName, Result
 from app.db.models import ControllerCheckRow
 from app.figures.base import Card, card_of
 from app.figures.panels import ControllerFigure
@@ -97,8 +97,8 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
 
     Raises InputError that names what is wrong with it.
     """
-    from app.controller_checks.check import examine_content  # noqa: PLC0415 - imports every replica
-    from app.controller_checks.paparazzi import parse_gains  # noqa: PLC0415
+    from app.autopilots.loop_checks import examine_content  # noqa: PLC0415
+    from app.autopilots.paparazzi.loop_check import parse_gains  # noqa: PLC0415 - imports every replica
 
     given = None if gains is None else parse_gains(gains)
     return run_limited(
@@ -108,7 +108,7 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
 
 def examine_example() -> Result:
     """Check the takeoff that comes with the program, recorded from the autopilot's own code."""
-    from app.controller_checks.check import examine_file  # noqa: PLC0415 - imports every replica
+    from app.autopilots.loop_checks import examine_file  # noqa: PLC0415 - imports every replica
 
     return examine_file(RECORDED_TAKEOFF)
 
@@ -148,17 +148,17 @@ def get_check(session: Session, check_id: int) -> ControllerCheck:
 def figure(session: Session, check_id: int, name: FigureName, theme: ThemeName) -> Card:
     """Figure of one group of signals, recording and replica overlaid. Raises NotFoundError."""
     result = _result(get_one(session, check_id))
-    autopilot = _autopilot(result)
-    if name not in autopilot.figures:
-        raise NotFoundError("figure", name, hint=f"Available: {', '.join(autopilot.figures)}.")
-    title, signals = autopilot.figures[name]
+    check = _check(result)
+    if name not in check.figures:
+        raise NotFoundError("figure", name, hint=f"Available: {', '.join(check.figures)}.")
+    title, signals = check.figures[name]
     summary = "; ".join(
         f"{signal.name} {signal.verdict}, largest difference {signal.largest_difference:.4g} {signal.difference_unit}"
         for signal in result.signals
         if signal.name in signals
     )
     drawn = [result.curves[signal] for signal in signals if signal in result.curves]
-    described = f"Recorded and replica overlaid: {summary}. {autopilot.note}"
+    described = f"Recorded and replica overlaid: {summary}. {check.note}"
     return card_of(ControllerFigure(drawn, title, described, theme))
 
 
@@ -176,10 +176,10 @@ def _result(row: ControllerCheckRow) -> Result:
         ) from error
 
 
-def _autopilot(result: Result) -> Autopilot:
-    from app.controller_checks.check import AUTOPILOTS  # noqa: PLC0415 - imports every replica
+def _check(result: Result) -> LoopCheck:
+    from app.autopilots.loop_checks import CHECKS  # noqa: PLC0415 - imports every replica
 
-    return AUTOPILOTS[result.autopilot]
+    return CHECKS[AUTOPILOTS[result.autopilot]]
 
 
 def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
@@ -189,8 +189,8 @@ def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
             "file_name": row.file_name,
             "checked_at": row.checked_at,
             **{name: getattr(result, name) for name in _FROM_RESULT},
-            "autopilot": _autopilot(result).title,
-            "figures": [{"name": name, "title": title} for name, (title, _) in _autopilot(result).figures.items()],
+            "autopilot": AUTOPILOTS[result.autopilot].title,
+            "figures": [{"name": name, "title": title} for name, (title, _) in _check(result).figures.items()],
         },
         from_attributes=True,
     )

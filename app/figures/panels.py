@@ -8,6 +8,7 @@ from typing import ClassVar, Final, Literal
 
 import numpy as np
 
+from app.core.records.overlaid import Overlaid
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -177,25 +178,6 @@ def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
         "run 6": (palette.bad, 2, "longdash"),
     }
     return pens[style]
-
-
-Curve = tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Overlaid:
-    """One signal over time, recorded and from the replica, of equal length.
-
-    `differing_s` and `differing` are time and value of each mark where the recorded signal differs.
-    """
-
-    label: str
-    digits: int
-    time_s: Curve
-    recorded: Curve
-    replica: Curve
-    differing_s: Curve = ()
-    differing: Curve = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.px4.loop import SLOW_HZ, Px4Loop
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.px4_loop import SLOW_HZ, Px4Loop
 from app.core.analysis.segment import Segment
 from app.core.control import px4 as loop
 from app.core.control.px4_parameters import STEP_S, Packed, Parameters, low_pass_gain

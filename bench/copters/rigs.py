@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from app.core.analysis.ardupilot_loop import ArduPilotLoop
-from app.core.analysis.px4_loop import Px4Loop
+from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.px4.loop import Px4Loop
 from app.core.control import px4_parameters
 from app.core.control.ardupilot_parameters import Parameters
 from bench.copters.px4_simulation import fly_changes, sample_px4

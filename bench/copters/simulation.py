@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from scipy.signal import lfilter
 
-from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.control import ardupilot as loop

@@ -14,17 +14,16 @@ HOME: Final = re.compile(r"app\.autopilots\.\w+")
 
 LEFT: Final = {
     # The replicas, and what is built of them: vertical.py and horizontal.py of each folder, once they move there.
-    "app/core/analysis": 51,
+    "app/core/analysis": 4,
     "app/core/control": 13,
     "app/core/experiments": 7,
     "app/core/models": 8,
     "app/core/tuning": 4,
     # Logs of one firmware, until they are read as recordings.
-    "app/controller_checks": 55,
     "app/log_analyses": 5,
     "app/logs": 12,
     # The paper's loop, which the simulated vehicles and reproductions fly, and its command.
-    "app/cli": 6,
+    "app/cli": 5,
     "app/reproductions": 1,
     "app/simdrone": 1,
     "app/vehicles": 6,

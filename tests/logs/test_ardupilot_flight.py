@@ -10,7 +10,7 @@ import pytest
 
 from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.loop import Px4Loop
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import Segment
 from app.core.control.px4_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from app.autopilots.loop_checks import examine_content
 from app.autopilots.readers import read_content
-from app.controller_checks.check import examine_content
 
 NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")
 DATABASE = ("pydantic", "sqlalchemy")

@@ -6,9 +6,9 @@ its vehicle.
 from collections.abc import Mapping
 from typing import Final
 
-from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot, shaped_reference
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.recorded_flight import ardupilot_loop, read_ardupilot, shaped_reference
 from app.core.control import ardupilot_parameters
 from app.core.experiments.base import Experiment, Scatter
 from app.core.experiments.copter_steps import CopterSteps, copter_parameters

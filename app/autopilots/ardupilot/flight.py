@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.log import LOOP, history
+from app.autopilots.ardupilot.loop import SPACE, ArduPilotLoop
 from app.autopilots.recording import LONGEST_INTERVAL_S, EventKind, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
     LARGEST_LEAN,
@@ -16,7 +17,6 @@ from app.autopilots.segments import (
     require_gains,
     thinned,
 )
-from app.core.analysis.ardupilot_loop import SPACE, ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.control.ardupilot_parameters import (

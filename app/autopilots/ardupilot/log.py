@@ -8,20 +8,18 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.recording import (
     Event,
     EventKind,
-    GainSets,
-    LoggedGain,
     ParameterHistory,
     Recording,
     Setting,
     Source,
     columns_of,
-    own_names,
     restarts,
 )
-from app.core.control.ardupilot_parameters import GAINS, NEWER_NAMES, in_older_names
+from app.core.control.ardupilot_parameters import in_older_names
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import parameters_in, read_tables
 
@@ -61,12 +59,6 @@ _WANTED: Final = frozenset(
     {"PARM", "MAVC", "EV", "MSG", "PSCZ", *(each.message for each in (*LOOP.values(), *_BESIDE.values()))}
 )
 
-GAIN_SETS: Final[GainSets] = (
-    own_names(*GAINS),
-    tuple(LoggedGain(newer, older, 1.0 / factor) for newer, (older, factor) in NEWER_NAMES.items() if older in GAINS),
-)
-"""Until 4.6, and from 4.7 on."""
-
 _COMMANDS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
     {22: (EventKind.TAKEOFF, "NAV_TAKEOFF"), 21: (EventKind.COMMAND, "NAV_LAND")}
 )
@@ -78,7 +70,7 @@ _EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
         28: (EventKind.LIFT_OFF, "lift-off"),
     }
 )
-_MODES: Final[Mapping[float, str]] = MappingProxyType(
+MODES: Final[Mapping[float, str]] = MappingProxyType(
     {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
 )
 _OTHER_FIRMWARE: Final = re.compile(rb"(ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V\d")
@@ -93,13 +85,10 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
     return Recording(
         title=f"ArduPilot's on-board log, altitude from {altitude}",
-        autopilot="ardupilot",
-        clock="vehicle",
+        autopilot=ARDUPILOT,
         firmware=_other_firmware(tables),
         columns=columns,
-        from_ground=True,
         sources=list(tables),
-        gain_sets=GAIN_SETS,
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
         events=sorted(_events(tables, log.boots_s), key=lambda event: event.time_s),
         notes=restarts(len(log.boots_s)),
@@ -121,7 +110,7 @@ def _events(tables: Mapping[str, Table], boots_s: Sequence[float]) -> Iterator[E
     modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
     for (_, before), (time_s, mode) in pairwise(modes):
         if mode != before:
-            yield Event(EventKind.MODE, time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
+            yield Event(EventKind.MODE, time_s, f"the mode {MODES.get(mode, f'{mode:g}')}")
     for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id"):
         if event in _EVENTS:
             yield Event(_EVENTS[event][0], time_s, _EVENTS[event][1])

@@ -67,6 +67,7 @@ def _simulated() -> tuple[SimulatedKind, ...]:
 ARDUPILOT: Final = Autopilot(
     name="ardupilot",
     title="ArduCopter",
+    project="ArduPilot",
     experiments=EXPERIMENTS,
     dialect=ARDUPILOTMEGA,
     autopilot=3,

@@ -8,13 +8,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise, product
-from types import MappingProxyType
 from typing import BinaryIO, Final
 from xml.parsers import expat
 
 import numpy as np
 
-from app.autopilots.recording import Column, Event, EventKind, GainSets, Recording, Setting, increasing, own_names
+from app.autopilots.paparazzi.profile import PAPARAZZI
+from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
 from app.core.control.loop_log import GAINS, FlownGains, LoopLog, flown_gains
 from app.core.control.paparazzi import FULL_THRUST
 from app.core.policy import Gains
@@ -28,10 +28,6 @@ _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
 _SETTINGS: Final = 256
 _MOST_CANDIDATES: Final = 32
 _PLATEAU_S: Final = 2.0
-
-PARAMETERS: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
-"""Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
-GAIN_SETS: Final[GainSets] = (own_names(*GAINS),)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,11 +55,9 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
     others = ", ".join(sorted(lines.others)[:5])
     return PaparazziRecording(
         title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
-        autopilot="paparazzi",
+        autopilot=PAPARAZZI,
         clock="ground",
         columns=_columns(lines, loop),
-        from_ground=False,
-        gain_sets=GAIN_SETS,
         settings=list(configuration.settings(flown)),
         events=[] if loop is None else [*_starts(loop), *_ends(loop)],
         notes=list(configuration.notes(flown)),

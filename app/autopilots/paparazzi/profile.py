@@ -215,6 +215,7 @@ PAPARAZZI: Final = Autopilot(
             GainParameter("kd", "gui_v_kd", 0.0, 800.0, whole=True),
         ),
     ),
+    logs_own_names=True,
     parameter_component=_ALL_COMPONENTS,
     stop_settings=_STOP_SETTINGS,
     readers=_READERS,

@@ -6,9 +6,9 @@ narrows them to suit its vehicle.
 from collections.abc import Mapping
 from typing import Final
 
+from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.recorded_flight import px4_loop, read_px4, straight_reference
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.px4_loop import Px4Loop
-from app.core.analysis.recorded_flight import px4_loop, read_px4, straight_reference
 from app.core.control import px4_parameters
 from app.core.experiments.base import Experiment, Scatter
 from app.core.experiments.copter_steps import LARGEST_STEP_M, CopterSteps, copter_parameters

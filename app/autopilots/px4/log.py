@@ -6,21 +6,20 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.px4.profile import PX4
 from app.autopilots.recording import (
     Column,
     Event,
     EventKind,
-    GainSets,
     Recording,
     Rows,
     Setting,
     Source,
     Span,
     columns_of,
-    own_names,
     spans_of,
 )
-from app.core.control.px4_parameters import GAINS, LOOP_NAMES
+from app.core.control.px4_parameters import LOOP_NAMES
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, rows_of
 from app.logs.ulog import has_rows, read_ulog_tables
@@ -67,7 +66,6 @@ SOURCES: Final[Mapping[str, Source]] = {
 """The given values are the set-points, in force until the next one; `thrust` is that of the body, logged more often
 than its target."""
 VEHICLE: Final = "MAV_SYS_ID"
-GAIN_SETS: Final[GainSets] = (own_names(*GAINS),)
 
 _TAKE_OFF, _LAND = 22, 21
 _ANSWERED_WITHIN_S: Final = 2.0
@@ -87,12 +85,9 @@ def read_px4(stream: BinaryIO) -> Recording:
     columns = columns_of(tables.topics, SOURCES, clock="timestamp")
     recording = Recording(
         title="PX4's log (ULog)",
-        autopilot="px4",
-        clock="vehicle",
+        autopilot=PX4,
         columns=columns,
-        from_ground=True,
         sources=[topic for topic, table in tables.topics.items() if has_rows(table)],
-        gain_sets=GAIN_SETS,
         settings=[Setting(*each) for each in tables.settings],
         notes=tables.notes,
     )

@@ -124,6 +124,7 @@ PX4: Final = Autopilot(
     automatic_modes=frozenset(f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256)),
     mode_names=_MODE_NAMES,
     gain_sets=(on_board(GAINS, integrating="MPC_Z_VEL_I_ACC"),),
+    sends_integers_bytewise=True,
     loop_parameters=(LOOP_NAMES,),
     may_lack=frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME}),
     hover_limits=_hover_limits,

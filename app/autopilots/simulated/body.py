@@ -42,7 +42,6 @@ class Flight(Protocol):
 
     def advance(self, steps: int, command: VerticalCommand) -> tuple[float, float, float, float]:
         """Return its altitude, m, climb rate, m/s, thrust and battery voltage after `steps` steps of 1/512 s."""
-        ...
 
     def forget_error_sum(self) -> None: ...
 
@@ -155,39 +154,30 @@ class SimulatedAutopilot(Protocol):
     @property
     def is_by_hand(self) -> bool:
         """Whether it is in the mode in which a pilot flies it."""
-        ...
 
     def held(self, parameter: str) -> float:
         """Return the true value of a parameter, whatever was sent. Raises KeyError for an unknown name."""
-        ...
 
     def receive(self, data: bytes) -> None:
         """Process bytes received by the radio."""
-        ...
 
     def take_over(self) -> None:
         """Switch to the pilot's mode, in which a pilot holds it in place."""
-        ...
 
     def hand_back(self) -> None:
         """Switch back from the pilot's mode to the automatic one."""
-        ...
 
     def kill(self) -> None:
         """Stop the motors, at any height, as another ground station commands."""
-        ...
 
     def fly_home(self) -> None:
         """Enter the mode in which it flies home by itself."""
-        ...
 
     def restore_persistent(self, before: Self) -> None:
         """Copy what survives a reboot from the autopilot before it."""
-        ...
 
     def tick(self) -> list[OutgoingMessage]:
         """Advance by one tick of TICK_S: process received messages, fly the body, and return the messages to send."""
-        ...
 
 
 @dataclass(slots=True)

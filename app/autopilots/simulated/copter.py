@@ -451,12 +451,8 @@ class Copter(ABC):
         self.report_checks()
         return ACCEPTED
 
-    def _handle_capabilities(self, _message: Message) -> int:
-        self.send("AUTOPILOT_VERSION")
-        return ACCEPTED
-
-    def _handle_home(self, _message: Message) -> int:
-        self.send("HOME_POSITION")
+    def _handle_report(self, message: Message) -> int:
+        self.send(_REPORTS[int(number(message, "command"))])
         return ACCEPTED
 
 
@@ -471,6 +467,8 @@ _LANDED_STATES: Final = {
     Phase.HOLDING: copter_telemetry.IN_AIR,
     Phase.LANDING: copter_telemetry.LANDING,
 }
+
+_REPORTS: Final = {GET_HOME: "HOME_POSITION", REQUEST_CAPABILITIES: "AUTOPILOT_VERSION"}
 
 _HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
     "HEARTBEAT": Copter._on_heartbeat,
@@ -489,10 +487,10 @@ _COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
     SET_MODE: Copter._handle_mode,
     ARM_DISARM: Copter._handle_arm,
     RUN_PREARM_CHECKS: Copter._handle_checks,
-    GET_HOME: Copter._handle_home,
+    GET_HOME: Copter._handle_report,
     SET_INTERVAL: Copter._handle_interval,
     REQUEST_MESSAGE: Copter._handle_request,
-    REQUEST_CAPABILITIES: Copter._handle_capabilities,
+    REQUEST_CAPABILITIES: Copter._handle_report,
 }
 
 

@@ -28,21 +28,17 @@ class LinearLoop(Protocol[_V_contra]):
     @property
     def texts(self) -> MarginTexts:
         """Its names and sentences."""
-        ...
 
     @property
     def step_s(self) -> float:
         """Duration of a step."""
-        ...
 
     def with_fast_gains(self, factor: float) -> Self:
         """The loop with this factor on the gains that all feedback passes through."""
-        ...
 
     def transition(self, vehicle: _V_contra, /, *, late_s: float = 0.0) -> Samples:
         """Derivative of the state of loop and vehicle after a step in hover with respect to that before, shape
         (k, k); the vehicle follows `late_s` later than it does."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,109 +118,86 @@ class AltitudeLoop(LinearLoop[Copter], Protocol):
     @property
     def texts(self) -> LoopTexts:
         """Its names and sentences."""
-        ...
 
     @property
     def space(self) -> GainSpace:
         """The gains to choose."""
-        ...
 
     @property
     def gains(self) -> dict[str, float]:
         """The gains of its space, as they are."""
-        ...
 
     @property
     def firmware_parameters(self) -> dict[str, float]:
         """All that it depends on, by the names of the firmware; ArduCopter's by those until release 4.6."""
-        ...
 
     @property
     def assumed_hover_throttle(self) -> float:
         """The parameter for the throttle in hover."""
-        ...
 
     @property
     def hover_limits(self) -> tuple[float, float] | None:
         """Least and largest hover throttle that the loop finds in flight; None if it keeps to its parameter."""
-        ...
 
     @property
     def throttle_limits(self) -> tuple[float, float]:
         """Least and largest throttle."""
-        ...
 
     @property
     def usual_slope(self) -> tuple[float, float]:
         """Mean and standard deviation, over vehicles under this autopilot, of the slope of log thrust over log
         throttle."""
-        ...
 
     @property
     def slope_error(self) -> float:
         """Standard deviation of the fitted slope that comes from the vehicle's estimator, beyond gusts and noise."""
-        ...
 
     @property
     def target_tolerance_m_s(self) -> float:
         """How far a logged climb rate target may be from `climb_rate_targets`."""
-        ...
 
     @property
     def row_s(self) -> float | None:
         """Time before a row over which its acceleration is a mean; None if it was sensed."""
-        ...
 
     @property
     def accelerometer(self) -> Filter:
         """The filter between the vehicle's acceleration and that in the log."""
-        ...
 
     @property
     def sensor(self) -> Filter:
         """The filter between the vehicle's acceleration and that which the loop controls."""
-        ...
 
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:
         """Gains by the names and in the units of the vehicle's release."""
-        ...
 
     def rules(self, hover_throttle: float) -> dict[str, dict[str, float]]:
         """Gains that are set without a model, by name."""
-        ...
 
     def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
         """Lines of a parameter file with the proposed gains, by the names of the release, those flown as comments."""
-        ...
 
     def with_gains(self, gains: Mapping[str, float]) -> Self:
         """The loop with other values of these gains."""
-        ...
 
     def with_hover(self, hover_throttle: float) -> Self:
         """The loop with another value of the parameter for the throttle in hover."""
-        ...
 
     def climb_rate_targets(self, segment: Segment) -> Samples:
         """What the climb rate target of each row must be, shape (n,)."""
-        ...
 
     def excitation(self, segment: Segment, throttle: float) -> tuple[Samples, Samples]:
         """Climb rate and acceleration at each row, shape (n,) each, that follow from the reference alone; `throttle` is
         that of the flight on average."""
-        ...
 
     def start(self, steps: Steps) -> tuple[float, float]:
         """Climb rate and acceleration to start a segment with."""
-        ...
 
     def packed(self, copter: Copter) -> Samples:
         """The copter as `fly` takes it."""
-        ...
 
     def fly(self, run: Run) -> Samples:
         """Fly a run, shape (m, 6) as `FLOWN`."""
-        ...
 
 
 def in_order(gains: Mapping[str, float]) -> str:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from app.autopilots.px4.loop import Px4Loop
 from app.autopilots.px4.trace import read_px4_trace
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import FinerSegment
 from app.core.control.px4 import FLIGHT, GRAVITY, INPUTS, OUTPUTS
 from app.core.control.px4_parameters import Parameters

@@ -2,9 +2,10 @@
 
 import pytest
 
+from app.autopilots.ardupilot.recorded_flight import ardupilot_loop
+from app.autopilots.px4.recorded_flight import px4_loop
 from app.core.analysis.hover import advise_hover, found_hover
 from app.core.analysis.loop import AltitudeLoop
-from app.core.analysis.recorded_flight import ardupilot_loop, px4_loop
 from app.core.errors import InputError
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.core.analysis.margin import (
     EXTRA_LAG_S,
     LARGEST_MARGIN,

@@ -5,15 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot, shaped_reference
+from app.autopilots.px4.recorded_flight import px4_loop, read_px4
 from app.core.analysis.prediction import FlightModel
-from app.core.analysis.recorded_flight import (
-    Steps,
-    ardupilot_loop,
-    px4_loop,
-    read_ardupilot,
-    read_px4,
-    shaped_reference,
-)
+from app.core.analysis.recorded_flight import Steps
 from app.core.analysis.segment import FinerSegment
 from app.core.errors import TrajectoryError
 from app.core.models.copter import Copter

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.recorded_flight import ardupilot_loop
 from app.autopilots.experiments import experiment_of, space_of
-from app.core.analysis.ardupilot_loop import ArduPilotLoop
-from app.core.analysis.px4_loop import Px4Loop
-from app.core.analysis.recorded_flight import ardupilot_loop, px4_loop
+from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.recorded_flight import px4_loop
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.control.px4_parameters import Parameters as Px4Parameters
 from app.core.definition import Definition, LogEvidence, Start

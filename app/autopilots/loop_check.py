@@ -1,17 +1,18 @@
-"""Result of a check as plain data for storage: sentences, one line for each signal, and curves."""
+"""A recorded control loop compared with its replica, as plain data for storage: sentences, one line for each signal,
+and curves; and what the check must know of an autopilot."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import BinaryIO, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.core.control.loop_log import Overlay
-from app.core.records.trajectory import Samples
-from app.figures.panels import Overlaid
-from app.figures.scale import thinned
+from app.core.records.overlaid import Overlaid
+from app.core.records.trajectory import Samples, select_samples
+from app.logs.formats import Format
 
 Kind = Literal["log", "trace"]
 Verdict = Literal["exact", "agrees", "differs"]
@@ -24,21 +25,21 @@ CURVE_POINTS: Final = 1000
 MARKS: Final = 200
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Signal:
     """A signal of a loop. `scale` converts its recorded values to `unit`, in which it is drawn with `digits` decimals.
 
-    Differences are in `difference_unit`, as recorded; in a trace they may be at most `tolerance`, which `allowance`
-    describes.
+    Differences are in `difference_unit`, as recorded, by default `unit`; in a trace they may be at most `tolerance`,
+    which `allowance` describes.
     """
 
     title: str
     unit: str
     digits: int
-    difference_unit: str
-    scale: float = 1.0
     tolerance: float = 0.0
     allowance: str = "compared bit for bit"
+    difference_unit: str = ""
+    scale: float = 1.0
 
 
 Signals = Mapping[str, Signal]
@@ -88,6 +89,36 @@ class Result:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Upload:
+    """A file to examine: its content and name, the file that was written beside it, and gains that a person gave."""
+
+    stream: BinaryIO
+    name: str
+    companion: BinaryIO | None = None
+    given: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopCheck:
+    """The check of an autopilot whose vertical loop has a replica.
+
+    `recordings` completes the sentence “Give …”; `figures` holds a title and the signals one below another for each
+    figure that its recordings have; `note` is what a reader of its signals must know. `log` is the format of its own
+    log; `is_trace` says whether a file with these first bytes is a recorded run of its loop. `examine_log`
+    and `examine_trace` compare them with the replica and raise InputError that names what cannot be read.
+    """
+
+    recordings: str
+    signals: Signals
+    figures: Mapping[FigureName, tuple[str, tuple[str, ...]]]
+    note: str
+    log: Format
+    is_trace: Callable[[bytes], bool]
+    examine_log: Callable[[Upload], Result]
+    examine_trace: Callable[[Upload], Result]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TraceReplay:
     """A trace and what the replica computed from the same inputs.
 
@@ -101,8 +132,15 @@ class TraceReplay:
     gains: Mapping[str, float] | None
     notes: tuple[str, ...] = field(default=())
 
+    @property
+    def compared(self) -> "TraceReplay":
+        """Of the signals that have a value in any row."""
+        names = [name for name, values in self.recorded.items() if np.isfinite(values).any()]
+        recorded, replica = ({name: values[name] for name in names} for values in (self.recorded, self.replica))
+        return replace(self, recorded=recorded, replica=replica)
 
-def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
+
+def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
     """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
     apart = {name: _apart(replay.recorded[name], replay.replica[name]) for name in replay.recorded}
     differs = {name: ~(values <= signals[name].tolerance) for name, values in apart.items()}
@@ -123,31 +161,20 @@ def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay, *, ki
         notes=replay.notes,
         signals=results,
         curves=curves(signals, (overlay,)),
-        autopilot=autopilot,
         first_different_row=int(rows[0]) if rows.size else None,
     )
 
 
-def signal_result(
-    name: str,
-    signal: Signal,
-    overlay: Overlay,
-    *,
-    largest_difference: float,
-    tolerance: float | None = None,
-    difference_unit: str | None = None,
-    allowance: str | None = None,
-) -> SignalResult:
-    """Result of one signal; the last three replace those of `signal`."""
+def signal_result(name: str, signal: Signal, overlay: Overlay, *, largest_difference: float) -> SignalResult:
     wrong = np.flatnonzero(overlay.differs[name])
     verdict: Verdict = "differs" if wrong.size else "exact" if largest_difference == 0.0 else "agrees"
     return SignalResult(
         name=name,
         title=signal.title,
         largest_difference=largest_difference,
-        difference_unit=difference_unit or signal.difference_unit,
-        tolerance=signal.tolerance if tolerance is None else tolerance,
-        allowance=allowance or signal.allowance,
+        difference_unit=signal.difference_unit or signal.unit,
+        tolerance=signal.tolerance,
+        allowance=signal.allowance,
         verdict=verdict,
         different=int(wrong.size),
         first_different_s=round(float(overlay.time_s[wrong[0]]), 6) if wrong.size else None,
@@ -216,4 +243,4 @@ def _rounded(values: Samples) -> tuple[float, ...]:
 
 
 def _kept(values: Samples) -> list[int]:
-    return [int(place) for place in thinned(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)[0]]
+    return [int(place) for place in select_samples(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)]

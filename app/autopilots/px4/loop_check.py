@@ -7,11 +7,20 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.loop_check import (
+    Kind,
+    LoopCheck,
+    Result,
+    Signal,
+    SignalResult,
+    TraceReplay,
+    Upload,
+    grouped,
+    result_of_trace,
+)
 from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.replica_check import px4_loop_log
 from app.autopilots.px4.trace import is_px4_trace, read_px4_trace
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_replay import LoopTrace, Replay, replayed
@@ -20,23 +29,16 @@ from app.core.records.trajectory import Samples
 from app.logs.formats import Format
 
 _TOLERANCE: Final = 1e-5
-
-
-def _signal(title: str, unit: str, digits: int) -> Signal:
-    allowance = "firmware and replica compute in single precision"
-    return Signal(
-        title=title, unit=unit, difference_unit=unit, digits=digits, tolerance=_TOLERANCE, allowance=allowance
-    )
-
+_PRECISION: Final = "firmware and replica compute in single precision"
 
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     {
-        "takeoff_state": _signal("State of the takeoff", "", 0),
-        "out_vz_m_s": _signal("Velocity target", "m/s", 3),
-        "out_az_m_s2": _signal("Acceleration target", "m/s²", 3),
-        "out_thrust": _signal("Thrust", "of full", 4),
-        "ramp_m_s": _signal("Limit of the climb rate", "m/s", 3),
-        "out_vz_derivative": _signal("Derivative of the velocity", "m/s²", 3),
+        "takeoff_state": Signal("State of the takeoff", "", 0, _TOLERANCE, _PRECISION),
+        "out_vz_m_s": Signal("Velocity target", "m/s", 3, _TOLERANCE, _PRECISION),
+        "out_az_m_s2": Signal("Acceleration target", "m/s²", 3, _TOLERANCE, _PRECISION),
+        "out_thrust": Signal("Thrust", "of full", 4, _TOLERANCE, _PRECISION),
+        "ramp_m_s": Signal("Limit of the climb rate", "m/s", 3, _TOLERANCE, _PRECISION),
+        "out_vz_derivative": Signal("Derivative of the velocity", "m/s²", 3, _TOLERANCE, _PRECISION),
     }
 )
 _MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
@@ -73,25 +75,18 @@ def _examine_log(upload: Upload) -> Result:
 def _examine_trace(upload: Upload) -> Result:
     trace = read_px4_trace(upload.stream, name=upload.name)
     replay = _replayed(trace)
-    return (
-        _judged_by_medians(replay, _MEDIANS, kind="trace")
-        if trace.flown
-        else result_of_trace(PX4.name, _SIGNALS, replay)
-    )
+    return _judged_by_medians(replay, _MEDIANS, kind="trace") if trace.flown else result_of_trace(_SIGNALS, replay)
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
-    recorded = dict(zip(OUTPUTS, trace.outputs.T, strict=True))
     replay = replayed(trace)
-    computed = dict(zip(OUTPUTS, replay.outputs.T, strict=True))
-    compared = [name for name, values in recorded.items() if not np.isnan(values).all()]
     return TraceReplay(
         time_s=trace.time_s,
-        recorded={name: recorded[name] for name in compared},
-        replica={name: computed[name] for name in compared},
+        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
+        replica=dict(zip(OUTPUTS, replay.outputs.T, strict=True)),
         gains=trace.parameters.gains,
         notes=(*_order_notes(replay), _DOWN),
-    )
+    ).compared
 
 
 def _order_notes(replay: Replay) -> Iterable[str]:
@@ -105,15 +100,14 @@ def _order_notes(replay: Replay) -> Iterable[str]:
 def _compared(log: LoopLog) -> TraceReplay:
     replica = replica_of(log)
     recorded = {name: np.where(np.isfinite(replica[name]), getattr(log, name), np.nan) for name in COMPARED}
-    compared = [name for name in COMPARED if np.isfinite(recorded[name]).any()]
     time_s = log.time_s[log.place]
     return TraceReplay(
         time_s=time_s - time_s[0],
-        recorded={name: recorded[name] for name in compared},
-        replica={name: replica[name] for name in compared},
+        recorded=recorded,
+        replica=replica,
         gains=log.parameters.gains,
         notes=(*_log_notes(recorded), _DOWN),
-    )
+    ).compared
 
 
 def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
@@ -129,7 +123,7 @@ def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
 def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kind: Kind) -> Result:
     """The result of a flight; rows beyond what a median may be are marked, and decide nothing."""
     limited = {name: replace(each, tolerance=medians.get(name, each.tolerance)) for name, each in _SIGNALS.items()}
-    result = result_of_trace(PX4.name, limited, replay, kind=kind)
+    result = result_of_trace(limited, replay, kind=kind)
     signals = tuple(_judged(signal, replay) for signal in result.signals if signal.name in medians)
     differing = [signal.name for signal in signals if signal.verdict == "differs"]
     total = grouped(result.rows)
@@ -162,9 +156,7 @@ def _judged(signal: SignalResult, replay: TraceReplay) -> SignalResult:
     )
 
 
-PX4: Final = Autopilot(
-    name="px4",
-    title="PX4",
+CHECK: Final = LoopCheck(
     recordings="PX4's .ulg log of a flight, or a trace of its vertical loop with one row per estimate of position, "
     ".csv or .csv.gz",
     signals=_SIGNALS,

@@ -9,8 +9,7 @@ import numpy as np
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
+from app.autopilots.loop_check import LoopCheck, Result, Signal, TraceReplay, Upload, grouped, result_of_trace
 from app.core.control.ardupilot import OUTPUTS
 from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
 from app.core.control.ardupilot_replay import LoopTrace, replayed
@@ -19,22 +18,16 @@ from app.logs.formats import Format
 _PRECISION: Final = "firmware and recording have single precision"
 
 
-def _signal(title: str, unit: str, digits: int, tolerance: float) -> Signal:
-    return Signal(
-        title=title, unit=unit, difference_unit=unit, digits=digits, tolerance=tolerance, allowance=_PRECISION
-    )
-
-
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     {
-        "z_d_m": _signal("Desired altitude", "m", 3, 1e-4),
-        "v_d_m_s": _signal("Desired climb rate", "m/s", 3, 1e-4),
-        "a_d_m_s2": _signal("Desired acceleration", "m/s²", 3, 3e-4),
-        "v_t_m_s": _signal("Climb rate target", "m/s", 3, 1e-4),
-        "a_t_m_s2": _signal("Acceleration target", "m/s²", 3, 5e-4),
-        "i_term_permille": _signal("Integrator of the acceleration controller", "‰ of throttle", 1, 0.14),
-        "throttle": _signal("Demanded throttle", "of full", 4, 5e-4),
-        "throttle_filtered": _signal("Filtered throttle", "of full", 4, 5e-4),
+        "z_d_m": Signal("Desired altitude", "m", 3, 1e-4, _PRECISION),
+        "v_d_m_s": Signal("Desired climb rate", "m/s", 3, 1e-4, _PRECISION),
+        "a_d_m_s2": Signal("Desired acceleration", "m/s²", 3, 3e-4, _PRECISION),
+        "v_t_m_s": Signal("Climb rate target", "m/s", 3, 1e-4, _PRECISION),
+        "a_t_m_s2": Signal("Acceleration target", "m/s²", 3, 5e-4, _PRECISION),
+        "i_term_permille": Signal("Integrator of the acceleration controller", "‰ of throttle", 1, 0.14, _PRECISION),
+        "throttle": Signal("Demanded throttle", "of full", 4, 5e-4, _PRECISION),
+        "throttle_filtered": Signal("Filtered throttle", "of full", 4, 5e-4, _PRECISION),
     }
 )
 _UP: Final = "Altitude, climb rate and acceleration are positive up."
@@ -42,11 +35,11 @@ _UP: Final = "Altitude, climb rate and acceleration are positive up."
 
 def _examine_log(upload: Upload) -> Result:
     compared = _compared(ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name))
-    return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
+    return result_of_trace(_SIGNALS, compared, kind="log")
 
 
 def _examine_trace(upload: Upload) -> Result:
-    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(upload.stream, name=upload.name)))
+    return result_of_trace(_SIGNALS, _replayed(read_ardupilot_trace(upload.stream, name=upload.name)))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -63,14 +56,13 @@ def _replayed(trace: LoopTrace) -> TraceReplay:
 
 def _compared(log: LoopLog) -> TraceReplay:
     comparison = compare_log(log)
-    compared = {name: values for name, values in comparison.recorded.items() if np.isfinite(values).any()}
     return TraceReplay(
         time_s=log.time_s - log.time_s[0],
-        recorded=compared,
-        replica={name: comparison.replica[name] for name in compared},
+        recorded=comparison.recorded,
+        replica=comparison.replica,
         gains=log.parameters.gains,
         notes=(*_notes(comparison), _UP),
-    )
+    ).compared
 
 
 def _notes(comparison: LogComparison) -> Iterable[str]:
@@ -84,9 +76,7 @@ def _notes(comparison: LogComparison) -> Iterable[str]:
         yield "The demanded throttle was not computed: the log has no PIDA and CTUN beside PSCD."
 
 
-ARDUPILOT: Final = Autopilot(
-    name="ardupilot",
-    title="ArduCopter",
+CHECK: Final = LoopCheck(
     recordings="ArduCopter's .bin log of a flight in GUIDED, or a trace of its vertical loop with one row per step, "
     ".csv or .csv.gz",
     signals=_SIGNALS,

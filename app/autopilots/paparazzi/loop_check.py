@@ -1,24 +1,26 @@
 """Paparazzi's entry in the registry: its log of a flight, `.data` with VERT_LOOP, and traces with a row per step."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
-from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
-from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.results import (
+from app.autopilots.loop_check import (
+    LoopCheck,
     Result,
     Signal,
     TraceReplay,
+    Upload,
     curves,
     grouped,
     result_of_trace,
     signal_result,
 )
+from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
+from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
 from app.core.control.loop_log import (
     COMMANDS,
     GAINS,
@@ -42,21 +44,16 @@ from app.logs.paparazzi import HINT
 
 _MAX_DIGITS: Final = 9
 
+_in_counts: Final = partial(Signal, difference_unit="counts")
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     {
-        "z_ref": Signal(title="Reference altitude", unit="m", difference_unit="counts", scale=UNITS["z_ref"], digits=3),
-        "zd_ref": Signal(
-            title="Reference speed", unit="m/s", difference_unit="counts", scale=UNITS["zd_ref"], digits=3
-        ),
-        "zdd_ref": Signal(
-            title="Reference acceleration", unit="m/s²", difference_unit="counts", scale=UNITS["zdd_ref"], digits=2
-        ),
-        "z_sum_err": Signal(
-            title="Summed error", unit="m·s", difference_unit="counts", scale=UNITS["z_ref"] / RATE_HZ, digits=3
-        ),
-        "ff_cmd": Signal(title="Feed-forward", unit="of 9600", difference_unit="counts", digits=0),
-        "fb_cmd": Signal(title="Feedback", unit="of 9600", difference_unit="counts", digits=0),
-        "thrust": Signal(title="Commanded thrust", unit="of 9600", difference_unit="counts", digits=0),
+        "z_ref": _in_counts("Reference altitude", "m", 3, scale=UNITS["z_ref"]),
+        "zd_ref": _in_counts("Reference speed", "m/s", 3, scale=UNITS["zd_ref"]),
+        "zdd_ref": _in_counts("Reference acceleration", "m/s²", 2, scale=UNITS["zdd_ref"]),
+        "z_sum_err": _in_counts("Summed error", "m·s", 3, scale=UNITS["z_ref"] / RATE_HZ),
+        "ff_cmd": _in_counts("Feed-forward", "of 9600", 0),
+        "fb_cmd": _in_counts("Feedback", "of 9600", 0),
+        "thrust": _in_counts("Commanded thrust", "of 9600", 0),
     }
 )
 _TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
@@ -147,7 +144,7 @@ def _examine_log(upload: Upload) -> Result:
 
 def _examine_trace(upload: Upload) -> Result:
     trace = read_loop_trace_stream(upload.stream, name=upload.name)
-    return result_of_trace(PAPARAZZI.name, _SIGNALS, _replayed(trace))
+    return result_of_trace(_SIGNALS, _replayed(trace))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -167,20 +164,16 @@ def _result_of_log(checked: LogCheck) -> Result:
     *simulated, drawn = checked.overlays
     apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
     signals = [
-        signal_result(name, _SIGNALS[name], drawn, largest_difference=difference, allowance=_STEP_APART)
+        signal_result(name, replace(_SIGNALS[name], allowance=_STEP_APART), drawn, largest_difference=difference)
         for name, difference in apart.items()
     ]
     if simulation is not None:
+        judged = {
+            name: replace(_SIGNALS[name], tolerance=allowed, allowance=_COUNTED, difference_unit=_TOLERANCE_UNITS[name])
+            for name, allowed in TOLERANCES.items()
+        }
         signals[:0] = [
-            signal_result(
-                name,
-                _SIGNALS[name],
-                simulated[0],
-                largest_difference=difference,
-                tolerance=TOLERANCES[name],
-                difference_unit=_TOLERANCE_UNITS[name],
-                allowance=_COUNTED,
-            )
+            signal_result(name, judged[name], simulated[0], largest_difference=difference)
             for name, difference in simulation.largest_difference.items()
         ]
     return Result(
@@ -194,7 +187,6 @@ def _result_of_log(checked: LogCheck) -> Result:
         notes=(*_notes(checked), _DOWN),
         signals=tuple(signals),
         curves=curves(_SIGNALS, checked.overlays),
-        autopilot=PAPARAZZI.name,
     )
 
 
@@ -247,9 +239,7 @@ def _notes_on(commands: CommandCheck) -> Iterable[str]:
             yield f"Commands reproduced only with the {fields} one step apart: {grouped(count)}."
 
 
-PAPARAZZI: Final = Autopilot(
-    name="paparazzi",
-    title="Paparazzi",
+CHECK: Final = LoopCheck(
     recordings="the .data file of Paparazzi's ground log with VERT_LOOP messages, together with its .log, or a trace "
     "with one row per step of 1/512 s",
     signals=_SIGNALS,

@@ -4,22 +4,28 @@ The recording is the log of a flight, or a trace with a row for every step.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
-from app.controller_checks.ardupilot import ARDUPILOT
-from app.controller_checks.autopilot import Autopilot, Upload
-from app.controller_checks.paparazzi import PAPARAZZI
-from app.controller_checks.px4 import PX4
-from app.controller_checks.results import Result
+from app.autopilots.ardupilot import loop_check as ardupilot
+from app.autopilots.ardupilot.profile import ARDUPILOT
+from app.autopilots.autopilot import Autopilot
+from app.autopilots.loop_check import LoopCheck, Result, Upload
+from app.autopilots.paparazzi import loop_check as paparazzi
+from app.autopilots.paparazzi.profile import PAPARAZZI
+from app.autopilots.px4 import loop_check as px4
+from app.autopilots.px4.profile import PX4
 from app.core.errors import InputError, Problem
 from app.logs.formats import HEAD_BYTES, recognise
 
-AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType({each.name: each for each in (ARDUPILOT, PX4, PAPARAZZI)})
-"""Every autopilot with a replica, by name. The first one that recognises a recording examines it; Paparazzi, to which
-any gzipped file may belong, is last."""
+CHECKS: Final[Mapping[Autopilot, LoopCheck]] = MappingProxyType(
+    {ARDUPILOT: ardupilot.CHECK, PX4: px4.CHECK, PAPARAZZI: paparazzi.CHECK}
+)
+"""Every autopilot with a replica. The first one that recognises a recording examines it; Paparazzi, to which any
+gzipped file may belong, is last."""
 
 
 def examine(
@@ -29,12 +35,13 @@ def examine(
     head = _head_of(stream)
     upload = Upload(stream=stream, name=name, companion=companion, given=given)
     if (autopilot := _recognised(head)) is not None:
-        is_log = recognise(head) is autopilot.log
-        return autopilot.examine_log(upload) if is_log else autopilot.examine_trace(upload)
+        check = CHECKS[autopilot]
+        examined = check.examine_log(upload) if recognise(head) is check.log else check.examine_trace(upload)
+        return replace(examined, autopilot=autopilot.name)
     reason = "contains no signals of a control loop that Gainline has a replica of" if head else "is empty"
     raise InputError(
         f"{name} is not a recording of the vertical loop.",
-        hint=f"Use {'; '.join(each.recordings for each in AUTOPILOTS.values())}.",
+        hint=f"Use {'; '.join(each.recordings for each in CHECKS.values())}.",
         problems=(Problem("file", reason),),
     )
 
@@ -71,4 +78,4 @@ def _head_of(stream: BinaryIO) -> bytes:
 def _recognised(head: bytes) -> Autopilot | None:
     """The autopilot whose log, or a trace of whose loop, begins so."""
     log = recognise(head)
-    return next((each for each in AUTOPILOTS.values() if log is each.log or each.is_trace(head)), None)
+    return next((each for each, check in CHECKS.items() if log is check.log or check.is_trace(head)), None)
