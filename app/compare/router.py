@@ -39,9 +39,5 @@ def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "ligh
 )
 def get_comparison_csv(session: Reader, trial: TrialIds) -> Response:
     """Their curves on a common time grid of 0.02 s; each flight's own CSV contains the record as stored."""
-    export = service.export_curves(session, trial)
-    return Response(
-        export.csv,
-        media_type="text/csv",
-        headers={"Content-Disposition": f'attachment; filename="{export.file_name}"'},
-    )
+    name, csv = service.export_curves(session, trial)
+    return Response(csv, media_type="text/csv", headers={"Content-Disposition": f'attachment; filename="{name}"'})
