@@ -28,6 +28,8 @@ from app.fleet.schemas import VehicleChoice
 from app.vehicles.registry import VEHICLE_KINDS, check_options
 
 JsonObject = dict[str, Any]
+_SET_HERE: Final = {"id", "name", "definition", "safe_gains", "vehicle", "vehicle_options", "trials", "proposals"}
+"""Fields of a campaign that are not stored as they came."""
 _AT_ONCE_BYTES: Final = 16 * 2**20
 _HINT: Final = "Import it with the version of Gainline that wrote it, or update this installation."
 
@@ -74,19 +76,14 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
     vehicle, options = _vehicle(session, where, source)
     row = CampaignRow(
         name=campaigns.unused_name(session, source.name),
-        state=source.state,
-        outcome=source.outcome,
-        stop_reason=source.stop_reason,
         experiment=definition["experiment"],
         strategy=definition["strategy"],
         definition=definition,
-        definition_digest=source.definition_digest,
         safe_gains=source.safe_gains or (source.vehicle.safe_gains if source.vehicle.registered else None),
-        open_until_flight=source.open_until_flight,
         vehicle=vehicle,
         vehicle_options=options,
-        created_at=source.created_at,
         updated_at=utc_now(),
+        **_fields(source, _SET_HERE),
     )
     session.add(row)
     session.flush()
@@ -167,14 +164,13 @@ def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> N
 
 
 def _trial(bundle: Bundle, campaign: CampaignRow, source: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
-    kept = _fields(source, {"proposal", "record", "predicted", "photos", "telemetry", "curve"})
     return TrialRow(
         campaign_id=campaign.id,
         proposal_id=None if source.proposal is None else proposals[source.proposal].id,
         trajectory=_record(bundle, source.record),
         predicted=_record(bundle, source.predicted),
         curve=None if source.curve is None else [list(point) for point in source.curve],
-        **kept,
+        **_fields(source, {"proposal", "record", "predicted", "photos", "telemetry", "curve"}),
     )
 
 
@@ -199,7 +195,7 @@ def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignVi
     Raises InputError if this version does not support the content, and ConflictError while any flight is active,
     because a large bundle holds the write lock for longer than a flight may wait.
     """
-    if (flight := history.any_flight_under_way(session)) is not None:
+    if (flight := history.flight_under_way(session)) is not None:
         raise ConflictError(
             f"Campaign {flight.campaign_id} has a flight requested, staged or under way. Storing a bundle now would "
             "delay its commands and its record.",

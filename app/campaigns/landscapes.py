@@ -72,7 +72,7 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
     since."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
-    proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None
+    proposal = session.get(ProposalRow, named) if isinstance(named, int) else None
     if proposal is None:
         raise GainlineError("The job names no proposal.", hint="Open the campaign to compute it again.")
     if proposal.history_digest != past.digest:

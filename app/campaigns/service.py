@@ -35,7 +35,7 @@ from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
-from app.common.schemas import LONGEST_NAME, OptionValue, Page, decode_cursor, encode_cursor
+from app.common.schemas import LONGEST_NAME, OptionValue, Page, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.formatting import confidence_text, format_gains, named_flights
@@ -61,9 +61,8 @@ def list_campaigns(
     cursor: str | None,
 ) -> Page[CampaignSummary]:
     """One page of summaries. Raises InputError for a cursor of another list."""
-    after = None if cursor is None else decode_cursor(sort, cursor, repository.cursor_kind(sort))
     found, total = repository.campaign_page(
-        session, search=search, states=states, vehicles=vehicles, sort=sort, after=after, limit=limit
+        session, search=search, states=states, vehicles=vehicles, sort=sort, cursor=cursor, limit=limit
     )
     following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
     return Page(items=summaries(session, [row for row, _ in found[:limit]]), total=total, next_cursor=following)
