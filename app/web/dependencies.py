@@ -107,13 +107,13 @@ Reader = Annotated[Session, Depends(_reader, scope="function")]
 Writer = Annotated[Session, Depends(_writer, scope="function")]
 
 
+@dataclass(frozen=True, slots=True)
 class IdempotentRequest:
     """Carries out a POST in one transaction, and only once for requests with the same idempotency key."""
 
-    def __init__(self, database: Database, key: str | None, fingerprint: str) -> None:
-        self._database = database
-        self._key = key
-        self._fingerprint = fingerprint
+    database: Database
+    key: str | None
+    fingerprint: str
 
     def __call__(
         self, answer: type[M], work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None
@@ -124,12 +124,12 @@ class IdempotentRequest:
         `ahead` reads and computes before the transaction, so that the write lock is held for a short time only.
         """
         if ahead is not None:
-            with self._database.read() as session:
+            with self.database.read() as session:
                 ahead(session)
-        with self._database.write() as session:
-            if self._key is None:
+        with self.database.write() as session:
+            if self.key is None:
                 return work(session)
-            return carry_out_once(session, self._key, self._fingerprint, answer, work)
+            return carry_out_once(session, self.key, self.fingerprint, answer, work)
 
 
 def fingerprint(request: Request, body_digest: str) -> str:
