@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Annotated, BinaryIO, Final, TypeVar
+from typing import Annotated, Any, BinaryIO, Final, TypeVar
 
 from fastapi import Depends, Header, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
@@ -57,26 +57,18 @@ ControlToken = Annotated[
 # These are coroutines and so need no thread: an abort gets through while every thread waits for the database.
 
 
-async def _database(request: Request) -> Database:
-    database: Database = request.app.state.database
-    return database
+def of_app(name: str) -> Any:
+    """Dependency on what the application's state holds under that name."""
+
+    async def read(request: Request) -> Any:
+        return getattr(request.app.state, name)
+
+    return Depends(read)
 
 
-async def _live(request: Request) -> LiveLink:
-    live: LiveLink = request.app.state.live
-    return live
-
-
-CurrentDatabase = Annotated[Database, Depends(_database)]
-Live = Annotated[LiveLink, Depends(_live)]
-
-
-async def _settings(request: Request) -> Settings:
-    settings: Settings = request.app.state.settings
-    return settings
-
-
-CurrentSettings = Annotated[Settings, Depends(_settings)]
+CurrentDatabase = Annotated[Database, of_app("database")]
+Live = Annotated[LiveLink, of_app("live")]
+CurrentSettings = Annotated[Settings, of_app("settings")]
 
 
 async def _request_context(request: Request, settings: CurrentSettings, token: ControlToken = None) -> RequestContext:

@@ -16,7 +16,7 @@ from app.db.migrate import revision_of
 from app.db.trajectories import require_intact
 from app.web.addresses import EXPOSES, AddressInfo, addresses_elsewhere, exposure, is_in_container, qr_svg
 from app.web.dependencies import CurrentDatabase, CurrentSettings, Live
-from app.web.downloads import download
+from app.web.downloads import described, download
 
 router = APIRouter(prefix="/api/system", tags=["system"])
 
@@ -61,11 +61,7 @@ def get_system(request: Request, settings: CurrentSettings, database: CurrentDat
     )
 
 
-@router.get(
-    "/qr.svg",
-    response_class=Response,
-    responses={200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}},
-)
+@router.get("/qr.svg", response_class=Response, responses=described("image/svg+xml", binary=False))
 def get_address_code(
     request: Request,
     settings: CurrentSettings,
@@ -81,11 +77,7 @@ def get_address_code(
     return Response(qr_svg(address), media_type="image/svg+xml")
 
 
-@router.get(
-    "/backup",
-    response_class=StreamingResponse,
-    responses={200: {"content": {_SQLITE: {"schema": {"type": "string", "format": "binary"}}}}},
-)
+@router.get("/backup", response_class=StreamingResponse, responses=described(_SQLITE))
 def get_backup(database: CurrentDatabase) -> StreamingResponse:
     """The whole database at this moment, as one SQLite file; flights and computations continue meanwhile.
 

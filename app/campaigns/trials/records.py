@@ -336,37 +336,21 @@ def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOu
     return trajectory_view(campaigns.get_row(session, row.campaign_id), row, history.record_of(session, row), points)
 
 
-@dataclass(frozen=True, slots=True)
-class Export:
-    """A full record as CSV."""
-
-    file_name: str
-    csv: str
-    checksum: str
-
-
-def export_trajectory(session: Session, trial_id: int) -> Export:
-    """Export every sample with nine digits, which restore the stored single-precision number exactly."""
+def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:
+    """File name, CSV and checksum of a full record: every sample with nine digits, which restore the stored
+    single-precision number exactly."""
     row = history.trial_row(session, trial_id)
     record = history.record_of(session, row)
     assert row.trajectory is not None
     table = np.column_stack([record.time_s, *record.channels.values()])
     lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
-    return Export(
-        f"campaign-{row.campaign_id}-trial-{row.number}.csv", "\n".join(lines) + "\n", row.trajectory.checksum
-    )
+    name = f"campaign-{row.campaign_id}-trial-{row.number}.csv"
+    return name, "\n".join(lines) + "\n", row.trajectory.checksum
 
 
-@dataclass(frozen=True, slots=True)
-class TelemetryLog:
-    """A flight's .tlog and its file name for download."""
-
-    file: Path
-    name: str
-
-
-def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> TelemetryLog:
-    """Telemetry log of the trial's last flight that has one, else the one imported with the trial.
+def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
+    """Telemetry log of the trial's last flight that has one, else the one imported with the trial; and its name for
+    download.
 
     Raises NotFoundError when there is none.
     """
@@ -374,5 +358,5 @@ def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> Telem
     flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
     for file in (*flown, log_of_trial(data_dir, trial_id)):
         if file.is_file():
-            return TelemetryLog(file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog")
+            return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"
     raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")
