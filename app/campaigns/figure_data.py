@@ -128,16 +128,14 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         curves_title=experiment.curves_title,
         window=view.window,
         chosen=view.chosen,
-        altitude_limit_m=_altitude_limit(campaign, experiment.output),
+        altitude_limit_m=get_kind(campaign.vehicle.kind).altitude_limit_m
+        if experiment.output == "altitude_m"
+        else None,
     )
     if not curves:
         return bare
     drawn = _curves(session, flown, select_individual_flights(bare, view.chosen), experiment.output)
     return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
-
-
-def _altitude_limit(campaign: CampaignRow, output: str) -> float | None:
-    return get_kind(campaign.vehicle.kind).altitude_limit_m if output == "altitude_m" else None
 
 
 def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
