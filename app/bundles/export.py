@@ -37,20 +37,6 @@ from app.db.trajectories import is_intact, refused_for
 from app.db.types import utc_now
 from app.fleet.registration import origin_of
 
-
-def proposals_of(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
-    """Proposals of a campaign, in the order in which they were made."""
-    return session.scalars(
-        select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id)
-    ).all()
-
-
-def flight_ids_by_trial(session: Session, campaign_id: int) -> Sequence[tuple[int, int]]:
-    """Trial and flight ids, oldest flight first."""
-    wanted = select(FlightRow.trial_id, FlightRow.id).where(FlightRow.campaign_id == campaign_id)
-    return [(trial_id, flight_id) for trial_id, flight_id in session.execute(wanted.order_by(FlightRow.id))]
-
-
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """Time stamp of every part, so that the same campaign makes the same parts."""
 
@@ -102,9 +88,11 @@ class Packer:
         return name
 
     def _campaign(self, row: CampaignRow) -> Campaign:
-        proposals = proposals_of(self._session, row.id)
+        wanted = select(ProposalRow).where(ProposalRow.campaign_id == row.id).order_by(ProposalRow.id)
+        proposals = self._session.scalars(wanted).all()
         places = {proposal.id: place for place, proposal in enumerate(proposals)}
-        flights = dict(flight_ids_by_trial(self._session, row.id))
+        flown = select(FlightRow.trial_id, FlightRow.id).where(FlightRow.campaign_id == row.id).order_by(FlightRow.id)
+        flights = dict(self._session.execute(flown).all())
         photos: dict[int, list[TrialPhotoRow]] = {}
         for photo, _ in photos_of_campaign(self._session, row.id):
             photos.setdefault(photo.trial_id, []).append(photo)

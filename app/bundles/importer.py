@@ -1,7 +1,6 @@
 """Import of a checked bundle: stores it as rows with new ids; every number and time is unchanged."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,45 +27,10 @@ from app.fleet.schemas import VehicleChoice
 from app.vehicles.registry import VEHICLE_KINDS, check_options
 
 JsonObject = dict[str, Any]
+_SET_HERE: Final = {"id", "name", "definition", "safe_gains", "vehicle", "vehicle_options", "trials", "proposals"}
+"""Fields of a campaign that are not stored as they came."""
 _AT_ONCE_BYTES: Final = 16 * 2**20
 _HINT: Final = "Import it with the version of Gainline that wrote it, or update this installation."
-
-
-@dataclass(slots=True)
-class ImportedCampaigns:
-    """The campaigns imported from a bundle, the requested one last.
-
-    `telemetry`: the bundle parts with telemetry logs, by the trial's new id, to be written once the rows are committed.
-    """
-
-    rows: list[CampaignRow] = field(default_factory=list)
-    telemetry: dict[int, str] = field(default_factory=dict)
-
-
-def store(session: Session, bundle: Bundle) -> ImportedCampaigns:
-    """Store the bundle's campaigns. The bundle must have been checked. Raises InputError if this version does not
-    support the content."""
-    arrived, new_ids = ImportedCampaigns(), dict[int, int]()
-    for place, campaign in enumerate(bundle.contents.campaigns):
-        row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
-        new_ids[campaign.id] = row.id
-        proposals = [_proposal(session, bundle, row, each) for each in campaign.proposals]
-        made = _trials(session, bundle, row, campaign.trials, proposals)
-        arrived.telemetry |= {
-            new.id: trial.telemetry for new, trial in zip(made, campaign.trials, strict=True) if trial.telemetry
-        }
-        if not proposals or is_stale(session, row, proposals[-1], history.trials_of(session, row.id)):
-            request_proposal(session, row)  # stale under the new ids; the result has the same gains
-        arrived.rows.append(row)
-    return arrived
-
-
-def keep_telemetry(bundle: Bundle, arrived: ImportedCampaigns, data_dir: Path) -> None:
-    """Write the telemetry logs beside those of local flights."""
-    for trial_id, part in arrived.telemetry.items():
-        file = log_of_trial(data_dir, trial_id)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(bundle.part(part))
 
 
 def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[int, int]) -> CampaignRow:
@@ -74,19 +38,14 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
     vehicle, options = _vehicle(session, where, source)
     row = CampaignRow(
         name=campaigns.unused_name(session, source.name),
-        state=source.state,
-        outcome=source.outcome,
-        stop_reason=source.stop_reason,
         experiment=definition["experiment"],
         strategy=definition["strategy"],
         definition=definition,
-        definition_digest=source.definition_digest,
         safe_gains=source.safe_gains or (source.vehicle.safe_gains if source.vehicle.registered else None),
-        open_until_flight=source.open_until_flight,
         vehicle=vehicle,
         vehicle_options=options,
-        created_at=source.created_at,
         updated_at=utc_now(),
+        **_fields(source, _SET_HERE),
     )
     session.add(row)
     session.flush()
@@ -167,14 +126,13 @@ def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> N
 
 
 def _trial(bundle: Bundle, campaign: CampaignRow, source: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
-    kept = _fields(source, {"proposal", "record", "predicted", "photos", "telemetry", "curve"})
     return TrialRow(
         campaign_id=campaign.id,
         proposal_id=None if source.proposal is None else proposals[source.proposal].id,
         trajectory=_record(bundle, source.record),
         predicted=_record(bundle, source.predicted),
         curve=None if source.curve is None else [list(point) for point in source.curve],
-        **kept,
+        **_fields(source, {"proposal", "record", "predicted", "photos", "telemetry", "curve"}),
     )
 
 
@@ -199,12 +157,25 @@ def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignVi
     Raises InputError if this version does not support the content, and ConflictError while any flight is active,
     because a large bundle holds the write lock for longer than a flight may wait.
     """
-    if (flight := history.any_flight_under_way(session)) is not None:
+    if (flight := history.flight_under_way(session)) is not None:
         raise ConflictError(
             f"Campaign {flight.campaign_id} has a flight requested, staged or under way. Storing a bundle now would "
             "delay its commands and its record.",
             hint="Import the bundle after it has landed, or unstage it.",
         )
-    arrived = store(session, bundle)
-    keep_telemetry(bundle, arrived, data_dir)
-    return campaigns.get_campaign(session, arrived.rows[-1].id)
+    new_ids, telemetry = dict[int, int](), dict[int, str]()
+    for place, campaign in enumerate(bundle.contents.campaigns):
+        row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
+        new_ids[campaign.id] = row.id
+        proposals = [_proposal(session, bundle, row, each) for each in campaign.proposals]
+        made = _trials(session, bundle, row, campaign.trials, proposals)
+        telemetry |= {
+            new.id: trial.telemetry for new, trial in zip(made, campaign.trials, strict=True) if trial.telemetry
+        }
+        if not proposals or is_stale(session, row, proposals[-1], history.trials_of(session, row.id)):
+            request_proposal(session, row)  # stale under the new ids; the result has the same gains
+    for trial_id, part in telemetry.items():  # beside those of local flights
+        file = log_of_trial(data_dir, trial_id)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(bundle.part(part))
+    return campaigns.get_campaign(session, new_ids[bundle.contents.campaigns[-1].id])

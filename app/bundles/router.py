@@ -12,18 +12,14 @@ from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
 from app.campaigns.schemas import Campaign
 from app.web.dependencies import FILE_BODY, CurrentDatabase, CurrentSettings, Id, Record
-from app.web.downloads import download
+from app.web.downloads import described, download
 
 router = APIRouter(prefix="/api", tags=["bundles"])
 
 _ZIP: Final = "application/zip"
 
 
-@router.get(
-    "/campaigns/{campaign_id}/bundle",
-    response_class=StreamingResponse,
-    responses={200: {"content": {_ZIP: {"schema": {"type": "string", "format": "binary"}}}}},
-)
+@router.get("/campaigns/{campaign_id}/bundle", response_class=StreamingResponse, responses=described(_ZIP))
 def get_bundle(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> StreamingResponse:
     """Export the whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log."""
     with ExitStack() as until_made:

@@ -51,6 +51,11 @@ def read_preset(name: str) -> CampaignFile:
     return read_campaign_file(PRESETS_DIR / f"{name}.yaml")
 
 
+def read_named(source: str) -> CampaignFile:
+    """Read the preset of that name, else the file at that path. Raises what `read_campaign_file` raises."""
+    return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
+
+
 def read_campaign_file(path: Path) -> CampaignFile:
     """Read and check a campaign file. Raises InputError with the line of each problem."""
     document = _load(path)

@@ -1,6 +1,7 @@
 """What this installation offers (experiments, strategies, vehicles, presets), and its health."""
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 from fastapi import APIRouter
@@ -14,9 +15,7 @@ from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
-from app.core.tuning.strategy import Strategy
 from app.fleet.views import is_registered_one_by_one
-from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
 from app.web.dependencies import Live
 
@@ -159,42 +158,33 @@ def get_catalogue() -> Catalogue:
             )
             for each in EXPERIMENTS.values()
         ],
-        strategies=[_strategy(each) for each in STRATEGIES.values()],
-        vehicle_kinds=[_kind(kind) for kind in VEHICLE_KINDS.values()],
+        strategies=[
+            StrategyInfo.view_of(
+                strategy, experiments=[each.name for each in EXPERIMENTS.values() if strategy.works_with(each)]
+            )
+            for strategy in STRATEGIES.values()
+        ],
+        vehicle_kinds=[
+            VehicleKindInfo.view_of(
+                kind,
+                registered=is_registered_one_by_one(kind),
+                experiments=list(kind.experiments),
+                highest_set_point_m=kind.highest_set_point_m if math.isfinite(kind.highest_set_point_m) else None,
+            )
+            for kind in VEHICLE_KINDS.values()
+        ],
         autopilots=[
             AutopilotInfo.view_of(each, experiments=[own.name for own in each.experiments])
             for each in AUTOPILOTS.values()
         ],
-        presets=[preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
+        presets=list(_presets()),
     )
 
 
-def _kind(kind: VehicleKind) -> VehicleKindInfo:
-    return VehicleKindInfo.view_of(
-        kind,
-        registered=is_registered_one_by_one(kind),
-        experiments=list(kind.experiments),
-        highest_set_point_m=kind.highest_set_point_m if math.isfinite(kind.highest_set_point_m) else None,
-    )
-
-
-def _strategy(strategy: Strategy) -> StrategyInfo:
-    return StrategyInfo.view_of(
-        strategy,
-        experiments=[each.name for each in EXPERIMENTS.values() if strategy.works_with(each)],
-    )
-
-
-def _is_ready(preset: PresetInfo) -> bool:
-    """Whether its vehicle is available without being registered first."""
-    return not is_registered_one_by_one(get_kind(preset.campaign.vehicle.kind))
-
-
-def _preset(name: str) -> PresetInfo:
-    file = read_preset(name)
-    return PresetInfo(
-        name=name,
-        title=file.name,
-        line=file.description,
-        campaign=NewCampaign.model_validate(file.model_dump(exclude={"description", "gains"})),
-    )
+def _presets() -> Iterator[PresetInfo]:
+    """Those whose vehicle is available without being registered first."""
+    for name in preset_names():
+        file = read_preset(name)
+        if not is_registered_one_by_one(get_kind(file.vehicle.kind)):
+            campaign = NewCampaign.model_validate(file.model_dump(exclude={"description", "gains"}))
+            yield PresetInfo(name=name, title=file.name, line=file.description, campaign=campaign)

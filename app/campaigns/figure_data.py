@@ -128,16 +128,14 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         curves_title=experiment.curves_title,
         window=view.window,
         chosen=view.chosen,
-        altitude_limit_m=_altitude_limit(campaign, experiment.output),
+        altitude_limit_m=get_kind(campaign.vehicle.kind).altitude_limit_m
+        if experiment.output == "altitude_m"
+        else None,
     )
     if not curves:
         return bare
     drawn = _curves(session, flown, select_individual_flights(bare, view.chosen), experiment.output)
     return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
-
-
-def _altitude_limit(campaign: CampaignRow, output: str) -> float | None:
-    return get_kind(campaign.vehicle.kind).altitude_limit_m if output == "altitude_m" else None
 
 
 def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
@@ -254,7 +252,7 @@ def _next_flight(
 def _curve_id(session: Session, row: TrialRow) -> int | None:
     """The stored curve with which a trial was planned: its proposal's, else its own. None where its record has shown
     that it was flown with other gains."""
-    proposal = None if row.proposal_id is None else repository.get_proposal_or_none(session, row.proposal_id)
+    proposal = None if row.proposal_id is None else session.get(ProposalRow, row.proposal_id)
     if proposal is None:
         return row.predicted_id
     return proposal.predicted_id if proposal.gains == row.gains else None
@@ -289,7 +287,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
         set_point=set_point,
-        reference=modelled if record is None else _recorded_reference(record) or modelled,
+        reference=modelled if record is None or "reference_m" not in record.channels else _curve(record, "reference_m"),
         curve=None if record is None else _curve(record, experiment.output),
         predicted=predicted,
         predicted_name=curve_name(predicts=predicts),
@@ -308,11 +306,6 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
 def _events(experiment: Experiment, record: Trajectory, glitches_s: Sequence[float]) -> tuple[FlightEvent, ...]:
     set_points = experiment.set_points
     return flight_events(record, glitches_s, () if set_points is None else set_points.pushes)
-
-
-def _recorded_reference(record: Trajectory) -> Curve | None:
-    """The autopilot's own reference, where it was recorded."""
-    return _curve(record, "reference_m") if "reference_m" in record.channels else None
 
 
 def _throttle(record: Trajectory) -> Curve:

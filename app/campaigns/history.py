@@ -9,7 +9,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
-from sqlalchemy.orm import Session
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session, defer
 
 from app.autopilots.experiments import experiment_of
 from app.campaigns import repository
@@ -46,8 +47,17 @@ FLOWN: Final = frozenset(
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
-    """The trials of one or more campaigns, by campaign and number."""
-    return repository.of_campaigns(session, campaign_ids)
+    """The trials of one or more campaigns, by campaign and number.
+
+    Large columns that are seldom needed for all trials (gate result, curve, settings, read-back gains) are loaded on
+    access.
+    """
+    return session.scalars(
+        select(TrialRow)
+        .where(TrialRow.campaign_id.in_(campaign_ids))
+        .options(*(defer(column) for column in (TrialRow.gate, TrialRow.curve, TrialRow.settings, TrialRow.read_back)))
+        .order_by(TrialRow.campaign_id, TrialRow.number)
+    ).all()
 
 
 def flights_of(session: Session, campaign_id: int, *, recorded: Collection[int] | None = None) -> tuple[Flight, ...]:
@@ -99,9 +109,12 @@ def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The scored flights in their order, with gains and errors only, so that many are read quickly."""
+    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
+        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
+    )
     return tuple(
         Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
-        for number, gains, error in repository.scored(session, campaign_id)
+        for number, gains, error in session.execute(wanted.order_by(TrialRow.number))
     )
 
 
@@ -161,24 +174,23 @@ def _loop_parameters(
     return {row_id: modelled.loop_parameters(_numbers(found)) for row_id, found in settings.items()}
 
 
-def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:
-    """The campaign's flight that is requested or running."""
-    return repository.flight_of_campaign_under_way(session, campaign_id)
-
-
-def any_flight_under_way(session: Session) -> FlightRow | None:
-    """A flight of any campaign that is requested or running."""
-    return repository.first_under_way(session)
+def flight_under_way(session: Session, campaign_id: int | None = None) -> FlightRow | None:
+    """The flight of the campaign, or without one of any, that is requested or running."""
+    wanted = select(FlightRow).where(FlightRow.state.in_(ACTIVE_FLIGHT_STATES)).order_by(FlightRow.id).limit(1)
+    return session.scalar(wanted if campaign_id is None else wanted.where(FlightRow.campaign_id == campaign_id))
 
 
 def trial_row(session: Session, trial_id: int) -> TrialRow:
     """Raises NotFoundError."""
-    return repository.get_trial(session, trial_id)
+    if (row := session.get(TrialRow, trial_id)) is None:
+        raise NotFoundError("trial", trial_id)
+    return row
 
 
 def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:
-    """The latest flight of each of these trials that has one."""
-    return repository.latest_flights(session, trial_ids)
+    """The latest flight of each of these trials that has one, by trial id."""
+    last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
+    return {row.trial_id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(last)))}
 
 
 def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:

@@ -72,7 +72,7 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
     since."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
-    proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None
+    proposal = session.get(ProposalRow, named) if isinstance(named, int) else None
     if proposal is None:
         raise GainlineError("The job names no proposal.", hint="Open the campaign to compute it again.")
     if proposal.history_digest != past.digest:
@@ -123,15 +123,11 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     )
     if job is not None and job.state == JobState.RUNNING and job.done_share:
         reason = f"{percent(job.done_share)} done: {job.doing}. The landscape appears here automatically."
-    return LandscapeAnswer(_card(reason), wanted=wanted)
+    return _waiting(reason, wanted=wanted)
 
 
-def _waiting(reason: str) -> LandscapeAnswer:
-    return LandscapeAnswer(_card(reason))
-
-
-def _card(reason: str) -> Card:
-    return Card(name=LandscapeFigure.name, title=_TITLE, state="waiting", reason=reason)
+def _waiting(reason: str, *, wanted: bool = False) -> LandscapeAnswer:
+    return LandscapeAnswer(Card(name=LandscapeFigure.name, title=_TITLE, state="waiting", reason=reason), wanted=wanted)
 
 
 def _name(campaign_id: int) -> str:

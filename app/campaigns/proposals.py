@@ -122,7 +122,7 @@ def request_proposal(session: Session, campaign: CampaignRow) -> None:
 
 def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) -> ProposalRow:
     """A proposal of this campaign that is not stale. Raises NotFoundError, or ConflictError when it is stale."""
-    row = repository.get_proposal_or_none(session, proposal_id)
+    row = session.get(ProposalRow, proposal_id)
     if row is None or row.campaign_id != campaign.id:
         raise NotFoundError("proposal", proposal_id, hint="Reload the page, then decide again.")
     if is_stale(session, campaign, row, history.trials_of(session, campaign.id)):

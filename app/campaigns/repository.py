@@ -10,12 +10,11 @@ from sqlalchemy.orm import Session, defer, joinedload
 
 from app.campaigns.schemas import Sort
 from app.common.errors import NotFoundError
-from app.common.schemas import Position, instant
-from app.common.states import ACTIVE_FLIGHT_STATES, CampaignState, TrialState
+from app.common.schemas import Position, decode_cursor, instant
+from app.common.states import CampaignState, TrialState
 from app.db.models import (
     CampaignRow,
     FlightRow,
-    GainsJson,
     OptionsJson,
     ProposalRow,
     RehearsalRow,
@@ -33,27 +32,6 @@ BEST_ERROR: Final = (
     .scalar_subquery()
 )
 """Lowest error of a campaign's valid trials, as an SQL expression on the campaign's row."""
-
-
-def get_trial(session: Session, trial_id: int) -> TrialRow:
-    """Raises NotFoundError."""
-    if (row := session.get(TrialRow, trial_id)) is None:
-        raise NotFoundError("trial", trial_id)
-    return row
-
-
-def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[TrialRow]:
-    """Trials of the campaigns, by campaign and number.
-
-    Large columns that are seldom needed for all trials (gate result, curve, settings, read-back gains) are loaded on
-    access.
-    """
-    return session.scalars(
-        select(TrialRow)
-        .where(TrialRow.campaign_id.in_(campaign_ids))
-        .options(*(defer(column) for column in (TrialRow.gate, TrialRow.curve, TrialRow.settings, TrialRow.read_back)))
-        .order_by(TrialRow.campaign_id, TrialRow.number)
-    ).all()
 
 
 def checksums(session: Session, campaign_id: int) -> Mapping[int, str]:
@@ -98,15 +76,6 @@ def trial_page(session: Session, campaign_id: int, *, after_number: int, limit: 
     return rows, total
 
 
-def scored(session: Session, campaign_id: int) -> Sequence[tuple[int, GainsJson, float]]:
-    """Number, gains and error of every valid trial; by number."""
-    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
-        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
-    )
-    found = session.execute(wanted.order_by(TrialRow.number))
-    return [(number, gains, error) for number, gains, error in found if error is not None]
-
-
 def has_claimed_flight(session: Session, campaign_id: int) -> bool:
     """Whether a worker has claimed any flight of the campaign; its vehicle's ledger then refers to it."""
     wanted = select(FlightRow.id).where(FlightRow.campaign_id == campaign_id, FlightRow.claimed_at.is_not(None))
@@ -128,32 +97,6 @@ def photos_of_trial(session: Session, trial_id: int) -> Sequence[TrialPhotoRow]:
     return session.scalars(
         select(TrialPhotoRow).where(TrialPhotoRow.trial_id == trial_id).order_by(TrialPhotoRow.id)
     ).all()
-
-
-def photo_or_none(session: Session, photo_id: int) -> TrialPhotoRow | None:
-    return session.get(TrialPhotoRow, photo_id)
-
-
-def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRow | None:
-    return session.scalar(
-        select(FlightRow)
-        .where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(ACTIVE_FLIGHT_STATES))
-        .order_by(FlightRow.id)
-        .limit(1)
-    )
-
-
-def first_under_way(session: Session) -> FlightRow | None:
-    """The first active flight of any vehicle."""
-    return session.scalar(
-        select(FlightRow).where(FlightRow.state.in_(ACTIVE_FLIGHT_STATES)).order_by(FlightRow.id).limit(1)
-    )
-
-
-def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:
-    """The last flight of each trial that has one, by trial id."""
-    last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
-    return {row.trial_id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(last)))}
 
 
 def flight_ids(session: Session, trial_id: int) -> Sequence[int]:
@@ -186,10 +129,6 @@ _ORDERS: Final[Mapping[Sort, _Order]] = {
 }
 
 
-def cursor_kind(sort: Sort) -> type[str] | type[float]:
-    return _ORDERS[sort].kind
-
-
 def get_campaign(session: Session, campaign_id: int) -> CampaignRow:
     """The campaign with that id. Raises NotFoundError."""
     if (row := session.get(CampaignRow, campaign_id)) is None:
@@ -215,14 +154,22 @@ def campaign_page(
     states: Collection[CampaignState],
     vehicles: Collection[str],
     sort: Sort,
-    after: Position | None,
+    cursor: str | None,
     limit: int,
 ) -> tuple[list[tuple[CampaignRow, Position]], int]:
-    """The next `limit` + 1 campaigns after that position, each with its own position; and the total count."""
-    wanted = _filters(search, states, vehicles)
+    """The next `limit` + 1 campaigns after the cursor, each with its position; and the total count.
+
+    Raises InputError for a cursor of another list.
+    """
+    wanted: list[ColumnElement[bool]] = [
+        *([CampaignRow.name.icontains(search, autoescape=True)] if search else []),
+        *([CampaignRow.state.in_(states)] if states else []),
+        *([VehicleRow.kind.in_(vehicles)] if vehicles else []),
+    ]
     total = session.scalar(select(func.count(CampaignRow.id)).join(CampaignRow.vehicle).where(*wanted)) or 0
     order = _ORDERS[sort]
-    if after is not None:
+    if cursor is not None:
+        after = decode_cursor(sort, cursor, order.kind)
         value = literal(instant(after[0]), UtcDateTime()) if order.is_time else literal(after[0])
         here, there = tuple_(order.value, CampaignRow.id), tuple_(value, literal(after[1]))
         wanted.append(here < there if order.descending else here > there)
@@ -237,14 +184,6 @@ def _in_cursor(value: object) -> str | float:
     if isinstance(value, datetime):
         return value.isoformat()
     return value if isinstance(value, int | float) else str(value)
-
-
-def _filters(search: str, states: Collection[CampaignState], vehicles: Collection[str]) -> list[ColumnElement[bool]]:
-    return [
-        *([CampaignRow.name.icontains(search, autoescape=True)] if search else []),
-        *([CampaignRow.state.in_(states)] if states else []),
-        *([VehicleRow.kind.in_(vehicles)] if vehicles else []),
-    ]
 
 
 def unflown_on(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
@@ -269,10 +208,6 @@ def rehearsed_ids(session: Session, campaign_ids: Collection[int]) -> Mapping[in
     """The campaigns that these rehearse, by the id of the rehearsal."""
     wanted = select(RehearsalRow).where(RehearsalRow.rehearsal_id.in_(campaign_ids))
     return {row.rehearsal_id: row.campaign_id for row in session.scalars(wanted)}
-
-
-def get_proposal_or_none(session: Session, proposal_id: int) -> ProposalRow | None:
-    return session.get(ProposalRow, proposal_id)
 
 
 def proposals_by_id(session: Session, proposal_ids: Collection[int]) -> Mapping[int, ProposalRow]:

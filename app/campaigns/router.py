@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Query, Request, status
+from fastapi import APIRouter, Depends, Query, status
 
 from app.accounts.permissions import Permission, is_allowed
 from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, wear
@@ -40,15 +40,8 @@ from app.web.dependencies import (
     Theme,
     Writer,
     json_only,
+    of_app,
 )
-
-
-async def _predictors(request: Request) -> flight_predictions.PredictorCache:
-    predictors: flight_predictions.PredictorCache = request.app.state.predictors
-    return predictors
-
-
-Predictors = Annotated[flight_predictions.PredictorCache, Depends(_predictors)]
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
 
@@ -152,7 +145,10 @@ def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
 
 @router.post("/{campaign_id}/prediction")
 def predict_gains(
-    database: CurrentDatabase, predictors: Predictors, campaign_id: Id, body: ConsideredGains
+    database: CurrentDatabase,
+    predictors: Annotated[flight_predictions.PredictorCache, of_app("predictors")],
+    campaign_id: Id,
+    body: ConsideredGains,
 ) -> GainsPrediction:
     """Predict a flight with any gains, by the model that the next proposal comes from. Changes nothing."""
     return flight_predictions.predict_gains(database, predictors, campaign_id, body.gains)

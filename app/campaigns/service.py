@@ -35,11 +35,10 @@ from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
-from app.common.schemas import LONGEST_NAME, OptionValue, Page, decode_cursor, encode_cursor
+from app.common.schemas import LONGEST_NAME, OptionValue, Page, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.formatting import confidence_text, format_gains, named_flights
-from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -61,9 +60,8 @@ def list_campaigns(
     cursor: str | None,
 ) -> Page[CampaignSummary]:
     """One page of summaries. Raises InputError for a cursor of another list."""
-    after = None if cursor is None else decode_cursor(sort, cursor, repository.cursor_kind(sort))
     found, total = repository.campaign_page(
-        session, search=search, states=states, vehicles=vehicles, sort=sort, after=after, limit=limit
+        session, search=search, states=states, vehicles=vehicles, sort=sort, cursor=cursor, limit=limit
     )
     following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
     return Page(items=summaries(session, [row for row, _ in found[:limit]]), total=total, next_cursor=following)
@@ -344,18 +342,13 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
             f"first gains is {compared.verdict}.",
             hint="Fly the best gains and the first gains again until the verdict is “better”.",
         )
-    gains = dict(now.winner.gains)
-    promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), context=context)
+    assert compared.confidence is not None
+    gains, sure = dict(now.winner.gains), confidence_text(compared.confidence)
+    because = f"{asked.statement} (campaign {row.id}, {named_flights(now.winner.numbers)}: better, {sure} confidence)"
+    promote_gains(session, row.vehicle, gains, version=asked.version, reason=because, context=context)
     safe_gains_changed(session, row.vehicle_id)
     session.flush()
     return get_vehicle(session, row.vehicle_id)
-
-
-def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
-    assert now.comparison is not None
-    assert now.comparison.confidence is not None
-    sure = confidence_text(now.comparison.confidence)
-    return f"{asked.statement} (campaign {row.id}, {named_flights(now.winner.numbers)}: better, {sure} confidence)"
 
 
 _NAME_ROOM: Final = 100
@@ -374,11 +367,17 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
         raise ConflictError(f"Campaign {row.id} needs no rehearsal: {why}.", hint="Fly it.")
     if existing.campaign_id is not None and existing.state != "failed":
         return campaign_view(session, repository.get_campaign(session, existing.campaign_id))
+    simulation = fleet.simulation_for(session, row.experiment, row.vehicle.safe_gains)
+    if simulation is None:
+        raise ConflictError(
+            f"No registered simulated drone flies “{get_experiment(row.experiment).title}”.",
+            hint="Register a simulated drone of the same autopilot (`gainline sim-drone`), connect it, then rehearse.",
+        )
     made = add_campaign(
         session,
         f"Rehearsal: {row.name[:_NAME_ROOM]}",
         Definition.model_validate(row.definition),
-        _simulation_of(session, row),
+        simulation,
         parent_id=row.id,
         safe_gains=dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains),
     )
@@ -386,12 +385,3 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
     session.flush()
     notify_rehearsed_campaign(session, made)
     return campaign_view(session, made)
-
-
-def _simulation_of(session: Session, row: CampaignRow) -> VehicleChoice:
-    if (found := fleet.simulation_for(session, row.experiment, row.vehicle.safe_gains)) is None:
-        raise ConflictError(
-            f"No registered simulated drone flies “{get_experiment(row.experiment).title}”.",
-            hint="Register a simulated drone of the same autopilot (`gainline sim-drone`), connect it, then rehearse.",
-        )
-    return found

@@ -70,7 +70,13 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         rehearses=repository.rehearsed_id(session, row.id),
         best=best_trial(trials, now),
         verdict=_verdict(now),
-        winner=_winner(repeatable),
+        winner=None
+        if repeatable is None
+        else Winner(
+            gains=dict(repeatable.winner.gains),
+            trial_numbers=list(repeatable.winner.numbers),
+            verdict=_verdict(repeatable),
+        ),
         standing=_standing(row, repeatable),
         trials=_counts(trials),
         flying=_flying(flight, trials),
@@ -163,7 +169,10 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         recommended=advice.kind,
         advice=advice,
         gains=row.gains,
-        changes=_changes(now, row.gains),
+        changes={
+            name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
+            for name, value in row.gains.items()
+        },
         choices=_choices(campaign, row, trials, advice),
         predicted_error=row.predicted_error if predicts else None,
         interval=interval if predicts else None,
@@ -204,23 +213,8 @@ def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
     return Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
 
 
-def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[str, GainChange]:
-    return {
-        name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
-        for name, value in following.items()
-    }
-
-
 def _verdict(now: ComparisonState | None) -> Verdict | None:
     return None if now is None or now.comparison is None else now.comparison.verdict
-
-
-def _winner(now: ComparisonState | None) -> Winner | None:
-    return (
-        None
-        if now is None
-        else Winner(gains=dict(now.winner.gains), trial_numbers=list(now.winner.numbers), verdict=_verdict(now))
-    )
 
 
 def _standing(row: CampaignRow, now: ComparisonState | None) -> Standing | None:

@@ -200,10 +200,11 @@ def run(
     data_dir: DataDir = None,
 ) -> None:
     """Fly a whole campaign on a simulation, without the dashboard, and print its table."""
+    from app.campaigns.campaign_files import override, read_named
     from app.cli.run import run_campaign
 
-    run_campaign(
-        campaign,
+    file = override(
+        read_named(campaign),
         vehicle=vehicle,
         strategy=strategy,
         start=start,
@@ -211,10 +212,8 @@ def run(
         max_flights=max_flights,
         gains=gains or [],
         settings=settings or [],
-        json_out=json_out,
-        data_dir=_settings(data_dir=data_dir).data_dir,
-        overrule=overrule,
     )
+    run_campaign(file, json_out=json_out, data_dir=_settings(data_dir=data_dir).data_dir, overrule=overrule)
 
 
 @app.command()

@@ -21,7 +21,7 @@ from app.autopilots.paparazzi.loop_check import LogCheck, check_log, parse_gains
 from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
-from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
+from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES
 from app.core.formatting import format_gains
 from app.reproductions.controller import run_controller
 from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction
@@ -119,16 +119,12 @@ def _replays_table(title: str, differences: Differences, checked: Mapping[Path, 
         (
             file.name,
             str(each.rows),
-            *(_digits(differences(each).get(name)) for name in names),
+            *("" if (found := differences(each).get(name)) is None else f"{found:.3g}" for name in names),
             _verdict(each),
         )
         for file, each in checked.items()
     ]
     return table(("file", "rows", *names, ""), rows, title=title)
-
-
-def _digits(difference: float | None) -> str:
-    return "" if difference is None else f"{difference:.3g}"
 
 
 def _largest_differences(checked: CheckResult) -> dict[str, float]:
@@ -211,13 +207,13 @@ def _refuse_other_autopilots(file: Path, data: BinaryIO) -> None:
 
 
 def _print(out: Console, file: Path, checked: LogCheck) -> None:
-    commands, simulation = checked.commands, checked.simulation
+    commands, simulation, first_s = checked.commands, checked.simulation, checked.commands.first_different_s
     tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
     rows = [
         ("bit-exact commands", f"{commands.exact} of {commands.rows}{tilted}"),
         ("of them with an r33 rounded to one count above level", str(commands.rounded)),
         *((f"exact with the {name} one step apart", str(count)) for name, count in commands.stale.items()),
-        ("different commands", _different(commands)),
+        ("different commands", f"{commands.different}{'' if first_s is None else f', the first at {first_s:.3f} s'}"),
     ]
     if simulation is None:
         rows.append(("reference and integrator", "not simulated: no command in the log, or another command within 2 s"))
@@ -238,11 +234,6 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
     if checked.better_gains is not None:
         out.print(f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?")
     out.print("The replica agrees." if checked.passed else "[bold]The replica differs.[/]")
-
-
-def _different(commands: CommandCheck) -> str:
-    first = commands.first_different_s
-    return str(commands.different) if first is None else f"{commands.different}, the first at {first:.3f} s"
 
 
 def _as_json(file: Path, checked: LogCheck) -> dict[str, object]:

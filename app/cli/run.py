@@ -12,14 +12,7 @@ from app.accounts.permissions import LOCAL_CLI
 from app.autopilots.experiments import experiment_of
 from app.campaigns import history, proposals
 from app.campaigns import service as campaigns
-from app.campaigns.campaign_files import (
-    CampaignFile,
-    gains_by_hand,
-    override,
-    preset_names,
-    read_campaign_file,
-    read_preset,
-)
+from app.campaigns.campaign_files import CampaignFile, gains_by_hand
 from app.campaigns.computation import compute
 from app.campaigns.definitions import check_campaign, stored
 from app.campaigns.trials.reviews import classify_trial
@@ -49,36 +42,13 @@ from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind, open_vehicle
 
 
-def run_campaign(
-    source: str,
-    *,
-    vehicle: str | None,
-    strategy: str | None,
-    start: str | None,
-    seed: int | None,
-    max_flights: int | None,
-    gains: Sequence[str],
-    settings: Sequence[str],
-    json_out: Path | None,
-    data_dir: Path,
-    overrule: str = "",
-) -> None:
-    """Fly the campaign of a preset or file and print its table.
+def run_campaign(file: CampaignFile, *, json_out: Path | None, data_dir: Path, overrule: str = "") -> None:
+    """Fly the campaign of a file and print its table.
 
     When an error ends the campaign, print the flights until then and the gains on the vehicle. What a trial changes on
     a vehicle with a link is kept in `data_dir`. Raises InputError if the campaign cannot be flown, StorageError when
     the folder cannot be used.
     """
-    file = override(
-        read_preset(source) if source in preset_names() else read_campaign_file(Path(source)),
-        vehicle=vehicle,
-        strategy=strategy,
-        start=start,
-        seed=seed,
-        max_flights=max_flights,
-        gains=gains,
-        settings=settings,
-    )
     definition, options = check_campaign(file.definition, file.vehicle)
     _require_flyable(file.vehicle, options)
     experiment = experiment_of(definition)
@@ -302,7 +272,7 @@ class _Display:
         self.kinds.append(kind)
         self._progress.console.print(
             f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
-            f"({_describe_outcome(trial)})",
+            f"({trial.state}{f': {reason}' if (reason := reason_of(trial)) else ''})",
             highlight=False,
         )
         self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
@@ -381,10 +351,6 @@ def _predicts(trial: TrialRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the trial's prediction says anything, as in the API."""
     lower = None if trial.predicted_interval is None else trial.predicted_interval["lower"]
     return history.is_prediction_informative(lower, trials, trial.number)
-
-
-def _describe_outcome(trial: TrialRow) -> str:
-    return f"{trial.state}: {reason_of(trial)}" if reason_of(trial) else trial.state.value
 
 
 def _error(value: float | None, unit: str) -> str:

@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,11 +25,6 @@ from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.base import VehicleOption
 from app.vehicles.registry import VEHICLE_KINDS
-
-
-def trials_by_id(session: Session, trial_ids: Collection[int]) -> Mapping[int, TrialRow]:
-    """The existing trials among these ids."""
-    return {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
 
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:
@@ -100,7 +95,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
 
     Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared.
     """
-    found = trials_by_id(session, trial_ids)
+    found = {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
     campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
     experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
     problems = [
@@ -216,7 +211,8 @@ def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
         ),
         FlightSetting(title="Strategy", unit="", value=strategy.title),
         *_options(campaign.definition["options"], strategy.options),
-        FlightSetting(title="Seed of the campaign", unit="", value=_seed(campaign)),
+        # As text, because the difference between two seeds has no meaning.
+        FlightSetting(title="Seed of the campaign", unit="", value=str(campaign.definition["seed"])),
     ]
     if battery:
         found.append(FlightSetting(title="Battery", unit="", value=battery))
@@ -241,11 +237,6 @@ def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference
         (name, known[name].unit if name in known else "", [side.row.gains.get(name) for side in sides])
         for name in names
     )
-
-
-def _seed(campaign: CampaignRow) -> str:
-    """As text, because the difference between two seeds has no meaning."""
-    return str(campaign.definition["seed"])
 
 
 def _options(

@@ -8,6 +8,7 @@ from app.common.schemas import FigureCard, figure_card
 from app.compare import service
 from app.compare.schemas import FlightComparison
 from app.web.dependencies import Reader, Theme
+from app.web.downloads import described
 
 router = APIRouter(prefix="/api/compare", tags=["compare"])
 
@@ -32,16 +33,8 @@ def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "ligh
     return figure_card(service.comparison_figure(session, trial, theme))
 
 
-@router.get(
-    "/curves.csv",
-    response_class=Response,
-    responses={200: {"content": {"text/csv": {"schema": {"type": "string"}}}}},
-)
+@router.get("/curves.csv", response_class=Response, responses=described("text/csv", binary=False))
 def get_comparison_csv(session: Reader, trial: TrialIds) -> Response:
     """Their curves on a common time grid of 0.02 s; each flight's own CSV contains the record as stored."""
-    export = service.export_curves(session, trial)
-    return Response(
-        export.csv,
-        media_type="text/csv",
-        headers={"Content-Disposition": f'attachment; filename="{export.file_name}"'},
-    )
+    name, csv = service.export_curves(session, trial)
+    return Response(csv, media_type="text/csv", headers={"Content-Disposition": f'attachment; filename="{name}"'})

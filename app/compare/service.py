@@ -1,7 +1,6 @@
 """Comparison of flights: what differs between them, its effect on the error, and their curves."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -30,14 +29,6 @@ from app.figures.theme import ThemeName
 GRID_STEP_S: Final = 0.02
 
 
-@dataclass(frozen=True, slots=True)
-class CurvesExport:
-    """The curves of several flights on a common time grid, as CSV."""
-
-    file_name: str
-    csv: str
-
-
 def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightComparison:
     """Compare the flights. Raises InputError naming those that cannot be compared."""
     sides = sides_of(session, trial_ids)
@@ -63,8 +54,8 @@ def comparison_figure(session: Session, trial_ids: Sequence[int], theme: ThemeNa
     return card_of(ComparisonFigure(_drawn(session, sides_of(session, trial_ids)), theme))
 
 
-def export_curves(session: Session, trial_ids: Sequence[int]) -> CurvesExport:
-    """Sample the curves every 0.02 s from the command to the end of the longest record.
+def export_curves(session: Session, trial_ids: Sequence[int]) -> tuple[str, str]:
+    """File name and CSV of the curves, every 0.02 s from the command to the end of the longest record.
 
     Linear between samples, empty outside a record. Raises InputError naming the flights that cannot be compared.
     """
@@ -78,7 +69,7 @@ def export_curves(session: Session, trial_ids: Sequence[int]) -> CurvesExport:
         title = f"campaign_{side.campaign.id}_flight_{side.row.number}_{side.experiment.output}"
         columns[title] = _column(flight.curve, grid)
     lines = [",".join(columns), *(",".join(cells) for cells in zip(*columns.values(), strict=True))]
-    return CurvesExport(f"{file_stem([side.row for side in sides])}.csv", "\n".join(lines) + "\n")
+    return f"{file_stem([side.row for side in sides])}.csv", "\n".join(lines) + "\n"
 
 
 def _column(curve: Curve | None, grid: Samples) -> list[str]:

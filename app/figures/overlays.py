@@ -47,7 +47,8 @@ def glitch_traces(
     x: list[float | None] = []
     y: list[float | None] = []
     for glitch in glitches:
-        time_s, values = _stretch(curve, glitch)
+        first, end = glitch.slice_of(curve.time_s)  # with the samples just before and after it, so that a gap shows
+        time_s, values = thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)
         x, y = [*x, *time_s, None], [*y, *values, None]
     return [
         scatter(
@@ -63,12 +64,6 @@ def glitch_traces(
             hovertemplate=reading(f"Flight {number}, glitch", unit),
         )
     ]
-
-
-def _stretch(curve: Curve, part: Range) -> tuple[list[float], list[float]]:
-    """Part of a curve, with the samples just before and after it, so that a gap is visible."""
-    first, end = part.slice_of(curve.time_s)
-    return thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)
 
 
 PRINT: Final = 0.18

@@ -117,11 +117,12 @@ class TrajectoriesFigure:
                 window=self._visible,
             )
         traces += leaving
+        opening = "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s"
         layout = theme.layout(
             palette,
             **self._axes(palette, low, high),
             margin=dict(theme.SIGNED_MARGIN_PX),
-            meta={"whole_s": self._whole_s, "opening": self._opening_title},
+            meta={"whole_s": self._whole_s, "opening": opening},
             uirevision="takeoffs",
         )
         summary = self._summary(len(leaving_top), len(leaving))
@@ -141,10 +142,6 @@ class TrajectoriesFigure:
     def _visible(self) -> Range:
         """The visible time range: the one asked for, else the one at first."""
         return self.history.window or Range(*self._opening_s)
-
-    @property
-    def _opening_title(self) -> str:
-        return "Steps" if changes_of(self.history.set_point) else f"First {OPENING_S[1]:g} s"
 
     @property
     def _whole_s(self) -> list[float]:
@@ -423,11 +420,9 @@ def _with_uids(traces: list[Trace]) -> list[Trace]:
 
     Plotly gives a trace without one that of the trace at the same place in the figure before, which may be a flight's.
     """
-    return [{"uid": _described(cast("Mapping[str, object]", trace["meta"])), **trace} for trace in traces]
-
-
-def _described(meta: Mapping[str, object]) -> str:
-    return "-".join(map(str, meta.values())).replace(" ", "-")
+    about = (cast("Mapping[str, object]", trace["meta"]).values() for trace in traces)
+    uids = ("-".join(map(str, each)).replace(" ", "-") for each in about)
+    return [{"uid": uid, **trace} for uid, trace in zip(uids, traces, strict=True)]
 
 
 def _style(palette: Palette, standing: str) -> dict[str, object]:

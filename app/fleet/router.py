@@ -137,7 +137,7 @@ async def _order(
     reason = (body or VehicleOrder()).reason
     if not live.worker_running:
         return OrderAnswer(accepted=False, sentence=NO_LINK)
-    answer = await live.send_vehicle_command(vehicle_id, order, reason)
+    answer = await live.client.order(vehicle_id, order, reason)
     return OrderAnswer(accepted=answer.accepted, sentence=sentence if answer.accepted else answer.problem)
 
 

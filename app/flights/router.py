@@ -69,7 +69,7 @@ def get_readiness(session: Reader, asking: RequestContextDep, live: Live, trial_
 async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body: Abort | None = None) -> AbortAnswer:
     """End a flight now. Goes straight to the worker without waiting for storage; may be repeated."""
     reason = (body or Abort()).reason
-    if live.worker_running and (await live.abort(trial_id, reason)).accepted:
+    if live.worker_running and (await live.client.abort(trial_id, reason)).accepted:
         return AbortAnswer(
             trial_id=trial_id, accepted=True, sentence="The worker ends the flight and restores the safe gains."
         )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Final
 
 import structlog
@@ -33,6 +33,7 @@ def recover(database: Database) -> None:
             _log.warning("job queued again: its worker stopped", job_id=job_id)
 
 
+@dataclass(slots=True, eq=False)
 class JobRunner:
     """Claims jobs of one kind, at most `room` at a time. `claim` and `heartbeat` are for one thread, `carry_out` for
     any.
@@ -41,33 +42,23 @@ class JobRunner:
     person, SupersededError when the result is no longer needed, and CancelledError when the worker ends.
     """
 
-    def __init__(
-        self,
-        database: Database,
-        kind: str,
-        perform: Callable[[ClaimedJob], None],
-        *,
-        room: int,
-        worker: str,
-        lease_s: float,
-        clock: Clock = REAL_TIME,
-    ) -> None:
-        self._database = database
-        self._kind = kind
-        self._perform = perform
-        self._room = room
-        self._worker = worker
-        self._lease_s = lease_s
-        self._clock = clock
-        self._at_work: set[int] = set()
-        self._beat_due_s = 0.0
+    database: Database
+    kind: str
+    perform: Callable[[ClaimedJob], None]
+    _: KW_ONLY
+    room: int
+    worker: str
+    lease_s: float
+    clock: Clock = REAL_TIME
+    _at_work: set[int] = field(default_factory=set, init=False)
+    _beat_due_s: float = field(default=0.0, init=False)
 
     def claim(self) -> ClaimedJob | None:
         """Claim the oldest queued job; None when there is none or the runner is full. Raises StorageError."""
-        if len(self._at_work) >= self._room:
+        if len(self._at_work) >= self.room:
             return None
-        with self._database.write() as session:
-            row = jobs.claim_job(session, worker=self._worker, kinds=(self._kind,), lease_s=self._lease_s)
+        with self.database.write() as session:
+            row = jobs.claim_job(session, worker=self.worker, kinds=(self.kind,), lease_s=self.lease_s)
             if row is None:
                 return None
             job = ClaimedJob(row.id, row.campaign_id, dict(row.order or {}))
@@ -79,23 +70,23 @@ class JobRunner:
 
         The latter are jobs that were given up because their result could not be stored. Raises StorageError.
         """
-        if self._clock.now_s() < self._beat_due_s:
+        if self.clock.now_s() < self._beat_due_s:
             return
-        self._beat_due_s = self._clock.now_s() + self._lease_s / HEARTBEATS_PER_LEASE
-        with self._database.write() as session:
+        self._beat_due_s = self.clock.now_s() + self.lease_s / HEARTBEATS_PER_LEASE
+        with self.database.write() as session:
             for job_id in tuple(self._at_work):
-                jobs.heartbeat_job(session, job_id, worker=self._worker, lease_s=self._lease_s)
+                jobs.heartbeat_job(session, job_id, worker=self.worker, lease_s=self.lease_s)
             jobs.requeue_expired_jobs(session)
 
     def carry_out(self, job: ClaimedJob) -> None:
         """Carry out a job, from the stored order to the stored result. Raises nothing."""
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
-            began_s = self._clock.now_s()
+            began_s = self.clock.now_s()
             ordered = ", ".join(f"{name}: {value}" for name, value in job.order.items())
-            _log.info("job started", worker=self._worker, order=ordered or None)
+            _log.info("job started", worker=self.worker, order=ordered or None)
             try:
-                self._perform(job)
-                _log.info("job finished", seconds=round(self._clock.now_s() - began_s, 3))
+                self.perform(job)
+                _log.info("job finished", seconds=round(self.clock.now_s() - began_s, 3))
             except CancelledError:
                 _log.info("job interrupted: the worker is shutting down; the next worker runs it again")
             except StorageError as error:
@@ -114,8 +105,8 @@ class JobRunner:
         else:
             _log.warning("job failed", why=str(error))
         try:
-            with self._database.write() as session:
-                jobs.fail_job(session, job.id, error, worker=self._worker)
+            with self.database.write() as session:
+                jobs.fail_job(session, job.id, error, worker=self.worker)
         except StorageError as refused:
             _log.error("job abandoned; it runs again when its lease expires", why=str(refused))
 

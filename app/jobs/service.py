@@ -11,17 +11,17 @@ from pathlib import Path
 from typing import Annotated, Final
 
 from pydantic import Field
-from sqlalchemy import update
+from sqlalchemy import ColumnElement, Select, func, select, update
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
+from app.common.errors import NotFoundError
 from app.common.logging import lines_of_job
 from app.common.schemas import Page, Schema, Trouble, decode_cursor, encode_cursor
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
-from app.db.models import JobRow, JsonObject
+from app.db.models import CampaignRow, JobRow, JsonObject
 from app.db.types import utc_now
-from app.jobs import repository
 
 
 class Job(Schema):
@@ -80,8 +80,10 @@ def enqueue_job(
 
     `order` describes the work; `latest_ordered` finds the job by its `name`.
     """
-    if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
-        return waiting
+    if campaign_id is not None:
+        same = _newest(kind).where(JobRow.campaign_id == campaign_id, JobRow.state == JobState.QUEUED)
+        if (waiting := session.scalar(same)) is not None:
+            return waiting
     row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, order=order)
     session.add(row)
     session.flush()
@@ -90,7 +92,8 @@ def enqueue_job(
 
 def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s: float) -> JobRow | None:
     """Claim the oldest queued job for this worker until the lease ends; None when there is none."""
-    if (row := repository.first_waiting(session, kinds)) is None:
+    waiting = select(JobRow).where(JobRow.state == JobState.QUEUED, JobRow.kind.in_(kinds))
+    if (row := session.scalar(waiting.order_by(JobRow.id).limit(1))) is None:
         return None
     _move(row, JobState.RUNNING)
     row.worker, row.attempts = worker, row.attempts + 1
@@ -102,7 +105,7 @@ def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s:
 
 def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float) -> bool:
     """Extend the lease. False when the job is no longer held by this worker, which must then stop it."""
-    if repository.held_by_or_none(session, job_id, worker) is None:
+    if _held_by(session, job_id, worker) is None:
         return False
     # Not through the row: a heartbeat alone must not publish a change event.
     session.execute(
@@ -119,7 +122,7 @@ def report_progress(session: Session, job_id: int, share: float, doing: str, *, 
 
     False when the job is no longer held by this worker, which must then stop it.
     """
-    row = repository.held_by_or_none(session, job_id, worker)
+    row = _held_by(session, job_id, worker)
     if row is None:
         return False
     row.done_share, row.doing = share, doing
@@ -132,20 +135,21 @@ def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject
 
     False, without a change, when the job was cancelled, deleted or given to another worker meanwhile.
     """
-    row = repository.held_by_or_none(session, job_id, worker)
+    row = _held_by(session, job_id, worker)
     if row is None:
         return False
     _move(row, JobState.DONE)
     row.finished_at, row.lease_until = utc_now(), None
     if result is not None:
         row.result, row.done_share, row.doing = result, 1.0, ""
-        repository.drop_older_results(session, row, _ordered(row))
+        older = (JobRow.kind == row.kind, _is_order(_ordered(row)), JobRow.id < row.id)
+        session.execute(update(JobRow).where(*older).values(result=None).execution_options(synchronize_session=False))
     return True
 
 
 def requeue_job(session: Session, job_id: int, *, worker: str) -> None:
     """Queue the job again as if it had not been started, because the worker shuts down; if this worker holds it."""
-    if (row := repository.held_by_or_none(session, job_id, worker)) is not None:
+    if (row := _held_by(session, job_id, worker)) is not None:
         row.attempts -= 1
         _requeue(row)
 
@@ -153,14 +157,14 @@ def requeue_job(session: Session, job_id: int, *, worker: str) -> None:
 def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> None:
     """Queue the job again after its process died, or fail it when that has happened too often; if this worker holds
     it."""
-    if (row := repository.held_by_or_none(session, job_id, worker)) is not None:
+    if (row := _held_by(session, job_id, worker)) is not None:
         _requeue(row)
 
 
 def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str) -> None:
     """Fail the job, or cancel one whose result is no longer needed, and store the error for a person; if this worker
     holds it."""
-    if (row := repository.held_by_or_none(session, job_id, worker)) is not None:
+    if (row := _held_by(session, job_id, worker)) is not None:
         _end(row, error)
 
 
@@ -171,27 +175,28 @@ def is_withdrawn(row: JobRow) -> bool:
 
 def requeue_running_jobs(session: Session) -> list[int]:
     """Queue all running jobs again at a worker's start, when no other worker can be running."""
-    return [_requeue(row) for row in repository.running(session)]
+    return _requeue_all(session, _RUNNING)
 
 
 def requeue_expired_jobs(session: Session) -> list[int]:
     """Queue jobs again whose lease has expired."""
-    return [_requeue(row) for row in repository.running(session, lease_before=utc_now())]
+    return _requeue_all(session, _RUNNING.where(JobRow.lease_until < utc_now()))
 
 
 def latest_job(session: Session, campaign_id: int, kind: str) -> JobRow | None:
     """The newest job of that kind for a campaign, in any state."""
-    return repository.latest_of_campaign(session, campaign_id, kind)
+    return session.scalar(_newest(kind).where(JobRow.campaign_id == campaign_id))
 
 
 def latest_ordered(session: Session, kind: str, name: str, states: Collection[JobState]) -> JobRow | None:
     """The newest job of that kind whose order has that name, in one of the states."""
-    return repository.latest_of_order(session, kind, name, states)
+    return session.scalar(_newest(kind).where(_is_order(name), JobRow.state.in_(states)))
 
 
 def latest_result(session: Session, kind: str, name: str) -> JobRow | None:
     """The newest job of that kind and name that has a result."""
-    return repository.latest_of_order(session, kind, name, (JobState.DONE,), with_result=True)
+    found = _newest(kind).where(_is_order(name), JobRow.state == JobState.DONE, JobRow.result.is_not(None))
+    return session.scalar(found)
 
 
 def list_jobs(
@@ -199,25 +204,33 @@ def list_jobs(
 ) -> Page[Job]:
     """Page of jobs, newest first."""
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
-    rows, total = repository.page(session, states=states, campaign_id=campaign_id, before_id=before, limit=limit)
+    wanted = select(JobRow)
+    if states:
+        wanted = wanted.where(JobRow.state.in_(states))
+    if campaign_id is not None:
+        wanted = wanted.where(JobRow.campaign_id == campaign_id)
+    total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
+    if before is not None:
+        wanted = wanted.where(JobRow.id < before)
+    rows = session.scalars(wanted.order_by(JobRow.id.desc()).limit(limit + 1)).all()
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
     return Page(items=job_views(session, rows[:limit]), total=total, next_cursor=following)
 
 
 def get_job(session: Session, job_id: int) -> Job:
-    return job_view(session, repository.get_one(session, job_id))
+    return job_view(session, _one(session, job_id))
 
 
 def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> JobLog:
     """Log lines of a job. Raises NotFoundError."""
-    row = repository.get_one(session, job_id)
+    row = _one(session, job_id)
     lines, total = lines_of_job(data_dir, job_id, since=row.created_at, limit=limit)
     return JobLog.model_validate({"lines": lines, "total": total}, from_attributes=True)
 
 
 def cancel_job(session: Session, job_id: int) -> Job:
     """Cancel a job. Raises ConflictError when it has ended already."""
-    row = repository.get_one(session, job_id)
+    row = _one(session, job_id)
     check_action(JOB_ACTIONS, "cancel", row.state, _name(row))
     _move(row, JobState.CANCELLED)
     row.finished_at, row.lease_until = utc_now(), None
@@ -227,7 +240,7 @@ def cancel_job(session: Session, job_id: int) -> Job:
 
 def retry_job(session: Session, job_id: int) -> Job:
     """Queue a job again. Raises ConflictError unless it failed or was cancelled."""
-    row = repository.get_one(session, job_id)
+    row = _one(session, job_id)
     check_action(JOB_ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
     row.attempts, row.problem, row.finished_at = 0, None, None
@@ -241,7 +254,9 @@ def job_view(session: Session, row: JobRow) -> Job:
 
 
 def job_views(session: Session, rows: Sequence[JobRow]) -> list[Job]:
-    names = repository.campaign_names(session, rows)
+    ids = {row.campaign_id for row in rows if row.campaign_id is not None}
+    named = session.execute(select(CampaignRow.id, CampaignRow.name).where(CampaignRow.id.in_(ids)))
+    names = {row.id: row.name for row in named}
     return [_view(row, None if row.campaign_id is None else names.get(row.campaign_id)) for row in rows]
 
 
@@ -270,12 +285,43 @@ def _remaining_s(row: JobRow) -> float | None:
     return elapsed_s * (1.0 - row.done_share) / row.done_share
 
 
+def _one(session: Session, job_id: int) -> JobRow:
+    """The job with that id. Raises NotFoundError."""
+    if (row := session.get(JobRow, job_id)) is None:
+        raise NotFoundError("job", job_id)
+    return row
+
+
+def _held_by(session: Session, job_id: int, worker: str) -> JobRow | None:
+    """The job, if it is running and held by this worker."""
+    return session.scalar(_RUNNING.where(JobRow.id == job_id, JobRow.worker == worker))
+
+
+_RUNNING: Final = select(JobRow).where(JobRow.state == JobState.RUNNING).order_by(JobRow.id)
+
+
+def _newest(kind: str) -> Select[JobRow]:
+    return select(JobRow).where(JobRow.kind == kind).order_by(JobRow.id.desc()).limit(1)
+
+
+def _is_order(name: str) -> ColumnElement[bool]:
+    name_of: ColumnElement[str] = JobRow.order["name"].as_string()
+    return name_of == name
+
+
 def _ordered(row: JobRow) -> str:
     """Name in the job's order; empty without an order."""
     return str((row.order or {}).get("name", ""))
 
 
-def _requeue(row: JobRow) -> int:
+def _requeue_all(session: Session, wanted: Select[JobRow]) -> list[int]:
+    rows = session.scalars(wanted).all()
+    for row in rows:
+        _requeue(row)
+    return [row.id for row in rows]
+
+
+def _requeue(row: JobRow) -> None:
     if row.attempts >= MAX_ATTEMPTS:
         happened = f"The worker stopped {row.attempts} times during this job."
         _end(row, GainlineError(happened, hint="Read its log on the Jobs page, then retry it."))
@@ -283,7 +329,6 @@ def _requeue(row: JobRow) -> int:
         _move(row, JobState.QUEUED)
         row.worker, row.lease_until = None, None
         row.done_share, row.doing = None, ""
-    return row.id
 
 
 def _end(row: JobRow, error: GainlineError) -> None:

@@ -117,8 +117,8 @@ class LiveClient:
             await self._listen(reader, writer)
 
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
-        """Request that the worker aborts a flight, and wait for its answer. Raises LinkDownError when it cannot be
-        reached."""
+        """Request that the worker aborts a flight, without the database, and wait for its answer. Raises
+        LinkDownError when it cannot be reached."""
         question = Abort(request=next(self._numbers), trial_id=trial_id, reason=reason, by_s=_deadline_s())
         return await self._ask(question, AbortAnswer)
 
@@ -276,24 +276,11 @@ class Live:
         """What is known of a vehicle now; may be called from any thread."""
         return VehicleReport(worker=self.client.answers, status=self.hub.vehicle(vehicle_id))
 
-    async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
-        """Abort a flight directly at the worker, without the database. Raises LinkDownError when it cannot be
-        reached."""
-        return await self.client.abort(trial_id, reason)
-
-    async def send_vehicle_command(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
-        """Send land or motors off directly to the worker. Raises LinkDownError when it cannot be reached."""
-        return await self.client.order(vehicle_id, order, reason)
-
     async def beat(self) -> None:
         """Publish periodically whether the worker is there, until cancelled."""
         while True:
             await asyncio.sleep(BEAT_S)
             self.hub.publish(LinkState(worker=self.client.answers))
-
-    def close(self) -> None:
-        """End every stream."""
-        self.hub.close()
 
     def _on_message(self, message: FromWorker) -> None:
         if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
@@ -310,7 +297,7 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
     try:
         yield live
     finally:
-        live.close()
+        live.hub.close()
         for task in running:
             task.cancel()
         for task in running:

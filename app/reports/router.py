@@ -9,15 +9,12 @@ from app.reports.html import Document, chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
 from app.web.dependencies import CurrentDatabase, CurrentSettings, Id
+from app.web.downloads import described
 
 router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 
 
-@router.get(
-    "/{campaign_id}/report.html",
-    response_class=Response,
-    responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}},
-)
+@router.get("/{campaign_id}/report.html", response_class=Response, responses=described("text/html", binary=False))
 def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
     """The whole campaign as one page that can be saved and sent: it needs neither Gainline nor a network."""
     document = _document(database, settings, campaign_id)
@@ -31,11 +28,7 @@ def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id
     )
 
 
-@router.get(
-    "/{campaign_id}/report.pdf",
-    response_class=Response,
-    responses={200: {"content": {"application/pdf": {"schema": {"type": "string", "format": "binary"}}}}},
-)
+@router.get("/{campaign_id}/report.pdf", response_class=Response, responses=described("application/pdf"))
 def get_report_as_pdf(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
     """The same as PDF, printed by Chromium on the server; 503 if it is not installed or already busy printing."""
     with database.read() as session:

@@ -242,15 +242,10 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             yield Anomaly(trial.number, kind or "Vehicle problem", end)
 
 
-def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
-    """Flights, by number, whose stored record does not match its checksum."""
-    for number_of_flight in damaged:
-        yield Anomaly(
-            number_of_flight,
-            "Damaged record",
-            "The stored record does not match its checksum. The curve shown is the coarse copy made at landing, and "
-            "the error is the one computed then. Restore the record from an earlier backup.",
-        )
+DAMAGED: Final = (
+    "The stored record does not match its checksum. The curve shown is the coarse copy made at landing, and the error "
+    "is the one computed then. Restore the record from an earlier backup."
+)
 
 
 def _end_beside(state: str, end: FlightEnd | None) -> str:

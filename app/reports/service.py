@@ -70,7 +70,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
     yield from sections.of_flights(trials, unit)
-    yield from sections.of_records(row.number for row in damaged_trials(session, campaign.id))
+    yield from (Anomaly(row.number, "Damaged record", sections.DAMAGED) for row in damaged_trials(session, campaign.id))
     if not campaign.vehicle.registered:
         return
     vehicle_id = campaign.vehicle.id

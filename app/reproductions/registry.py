@@ -3,7 +3,7 @@
 The modules that run them are imported on use, so that listing them needs none.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import MappingProxyType
@@ -21,8 +21,7 @@ class Reproduction:
     """One experiment, table or figure of the paper.
 
     `line` describes what is done here, `paper` what the paper shows. `figures` names the figures of a result in order,
-    with the paper's name for each. `run(on_progress, full)` is pure: the same result every time; `full` requests the
-    long form, which exists if `long_form` is not empty.
+    with the paper's name for each. `long_form` describes the long form, if there is one.
     """
 
     name: str
@@ -30,38 +29,22 @@ class Reproduction:
     line: str
     paper: str
     figures: Mapping[str, str]
-    run: Callable[[Progress, bool], Result]
     long_form: str = ""
 
+    def run(self, on_progress: Progress, full: bool) -> Result:
+        """Pure: the same result every time; `full` requests the long form, which exists if `long_form` is not empty."""
+        from app.reproductions import controller, f16, tables, variability  # noqa: PLC0415
 
-def _f16(on_progress: Progress, full: bool) -> Result:
-    from app.reproductions.f16 import run_f16  # noqa: PLC0415
-
-    return run_f16(on_progress, full)
-
-
-def _table1(on_progress: Progress, _full: bool) -> Result:
-    from app.reproductions.tables import run_table  # noqa: PLC0415
-
-    return run_table("table1", "figure7", on_progress)
-
-
-def _table2(on_progress: Progress, _full: bool) -> Result:
-    from app.reproductions.tables import run_table  # noqa: PLC0415
-
-    return run_table("table2", "figure11", on_progress)
-
-
-def _controller(on_progress: Progress, _full: bool) -> Result:
-    from app.reproductions.controller import run_controller  # noqa: PLC0415
-
-    return run_controller(on_progress)
-
-
-def _variability(on_progress: Progress, _full: bool) -> Result:
-    from app.reproductions.variability import run_variability  # noqa: PLC0415
-
-    return run_variability(on_progress)
+        match self.name:
+            case "f16":
+                return f16.run_f16(on_progress, full)
+            case "controller":
+                return controller.run_controller(on_progress)
+            case "variability":
+                return variability.run_variability(on_progress)
+            case _:
+                figure, _, _ = next(iter(self.figures)).partition("-")
+                return tables.run_table(self.name, figure, on_progress)
 
 
 _ALL: Final = (
@@ -79,7 +62,6 @@ _ALL: Final = (
             "figure3-right": "Fig. 3, right",
             "figure4": "Fig. 4",
         },
-        run=_f16,
         long_form="Methods compared over 50 models instead of 10, the re-identified model also at ±20 and ±80 % "
         "and from noisy logs: takes ten times as long.",
     ),
@@ -91,7 +73,6 @@ _ALL: Final = (
         paper="Five simulated takeoffs from the default gains take the error from 0.3775 m to 0.1521 m; four from the "
         "simplex's gains, from 0.1006 m to 0.0940 m.",
         figures={"figure7-left": "Fig. 7, left", "figure7-right": "Fig. 7, right"},
-        run=_table1,
     ),
     Reproduction(
         name="table2",
@@ -101,7 +82,6 @@ _ALL: Final = (
         paper="Five real takeoffs from the default gains take the error from 0.5102 m to 0.2265 m; three from the "
         "simplex's gains stay at 0.12 m, within the scatter.",
         figures={"figure11-left": "Fig. 11, left", "figure11-right": "Fig. 11, right"},
-        run=_table2,
     ),
     Reproduction(
         name="controller",
@@ -109,7 +89,6 @@ _ALL: Final = (
         line="A takeoff recorded from the autopilot's own code, replayed step by step through the replica.",
         paper="The copy of the vertical loop reproduces the autopilot's outputs except for small differences.",
         figures={"figure6-reference": "Fig. 6, above", "figure6-commands": "Fig. 6, below"},
-        run=_controller,
     ),
     Reproduction(
         name="variability",
@@ -119,7 +98,6 @@ _ALL: Final = (
         paper="The error scatters by 0.0141 m at the default gains and by 0.0066 m at the tuned ones; there is "
         "no trend over the battery.",
         figures={"figure12": "Fig. 12"},
-        run=_variability,
     ),
 )
 

@@ -2,8 +2,9 @@
 
 import threading
 from concurrent.futures import CancelledError
+from dataclasses import KW_ONLY, dataclass
 from time import monotonic
-from typing import Final, NoReturn
+from typing import Final
 
 import structlog
 
@@ -21,14 +22,15 @@ LOOK_S: Final = 0.5
 _log = structlog.get_logger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
 class ReproductionJob:
     """Executes reproduction jobs. `closing` interrupts the current one, which the next worker runs again."""
 
-    def __init__(self, database: Database, *, worker: str, lease_s: float, closing: threading.Event) -> None:
-        self._database = database
-        self._worker = worker
-        self._lease_s = lease_s
-        self._closing = closing
+    database: Database
+    _: KW_ONLY
+    worker: str
+    lease_s: float
+    closing: threading.Event
 
     def __call__(self, job: ClaimedJob) -> None:
         """Run a job from its stored order to its stored result.
@@ -41,14 +43,14 @@ class ReproductionJob:
                 result = self._watch(job, process)
             except ProcessDiedError as death:
                 _log.warning("the computing process died", name=order.name, exit_code=death.exit_code)
-                with self._database.write() as session:
-                    jobs.requeue_or_fail_job(session, job.id, worker=self._worker)
+                with self.database.write() as session:
+                    jobs.requeue_or_fail_job(session, job.id, worker=self.worker)
                 return
         if result is None:
             _log.info("reproduction cancelled", name=order.name)
             return
-        with self._database.write() as session:
-            jobs.finish_job(session, job.id, worker=self._worker, result=result.as_json())
+        with self.database.write() as session:
+            jobs.finish_job(session, job.id, worker=self.worker, result=result.as_json())
         _log.info("reproduction stored", name=order.name, seconds=round(monotonic() - started_s, 1))
 
     def _watch(self, job: ClaimedJob, process: ChildProcess) -> Result | None:
@@ -64,22 +66,19 @@ class ReproductionJob:
             if monotonic() < due_s:
                 continue
             due_s = monotonic() + LOOK_S
-            if self._closing.is_set():
-                self._put_back(job)
+            if self.closing.is_set():
+                with self.database.write() as session:
+                    jobs.requeue_job(session, job.id, worker=self.worker)
+                raise CancelledError
             if not self._still_wanted(job, latest, is_news=latest != stored):
                 return None
             stored = latest
 
-    def _put_back(self, job: ClaimedJob) -> NoReturn:
-        with self._database.write() as session:
-            jobs.requeue_job(session, job.id, worker=self._worker)
-        raise CancelledError
-
     def _still_wanted(self, job: ClaimedJob, latest: ProgressReport, *, is_news: bool) -> bool:
         """Whether the job still belongs to this worker; new progress is stored, which also notifies the browsers."""
-        with self._database.write() as session:
+        with self.database.write() as session:
             if not is_news:
-                return jobs.heartbeat_job(session, job.id, worker=self._worker, lease_s=self._lease_s)
+                return jobs.heartbeat_job(session, job.id, worker=self.worker, lease_s=self.lease_s)
             return jobs.report_progress(
-                session, job.id, latest.share, latest.doing, worker=self._worker, lease_s=self._lease_s
+                session, job.id, latest.share, latest.doing, worker=self.worker, lease_s=self.lease_s
             )

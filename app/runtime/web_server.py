@@ -125,7 +125,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         _announce_links(settings, listener.getsockname()[1], application.state.keyring, announce)
 
     def closing() -> None:
-        application.state.live.close()
+        application.state.live.hub.close()
 
     connections = Connections(room_for_connections(resource.getrlimit(resource.RLIMIT_NOFILE)[0]), REAL_TIME)
     config = uvicorn.Config(

@@ -15,6 +15,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
 from multiprocessing import parent_process
 from types import FrameType
 from typing import Final
@@ -146,23 +147,21 @@ def _say_it_computes(first: Future[int]) -> None:
         say("The worker is ready to compute.")
 
 
+@dataclass(slots=True)
 class Worker:
     """Everything that runs while the worker holds its lock."""
 
-    def __init__(
-        self, settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, clock: Clock = REAL_TIME
-    ) -> None:
-        self._settings = settings
-        self._clock = clock
-        self._ending = ending
-        self._abort_registry = abort_registry
-        self._name = f"{platform.node()}:{os.getpid()}"
+    settings: Settings
+    ending: ShutdownRequest
+    abort_registry: AbortRegistry
+    clock: Clock = REAL_TIME
+    name: str = field(default_factory=lambda: f"{platform.node()}:{os.getpid()}", init=False)
 
     def work(self) -> None:
         """Recover what the last worker left, then work until requested to end; then finish the flights and drop
         everything else."""
         with ExitStack() as stack:
-            database = Database(self._settings.database_file)
+            database = Database(self.settings.database_file)
             stack.callback(database.close)
             sessions, flight_runner, live = self._build_runners(database)
             stack.callback(flight_runner.close)
@@ -179,50 +178,50 @@ class Worker:
             )
             job_runners = self._build_job_runners(database, pool, landscape_pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
-            stack.callback(self._ending.set, "the worker failed; see its log")
+            stack.callback(self.ending.set, "the worker failed; see its log")
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid).add_done_callback(_say_it_computes)
-            _log.info("worker ready", worker=self._name)
+            _log.info("worker ready", worker=self.name)
             say("The worker is ready to fly.")
             self._loop(database, lambda: self._claim(flight_runner, flying, sessions, acting, job_runners, computing))
-            _log.info("worker ends", why=self._ending.reason, flying=self._abort_registry.trial_ids())
+            _log.info("worker ends", why=self.ending.reason, flying=self.abort_registry.trial_ids())
 
     def _build_runners(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
         def publish(message: PublishedMessage) -> None:
             live.publish(message)
 
-        data_dir, closing = self._settings.data_dir, self._ending.event
+        data_dir, closing = self.settings.data_dir, self.ending.event
         sessions = VehicleConnectionManager(
             database,
             data_dir,
-            self._abort_registry,
+            self.abort_registry,
             publish,
-            worker=self._name,
+            worker=self.name,
             closing=closing,
-            links=is_loopback(self._settings.host),
-            clock=self._clock,
+            links=is_loopback(self.settings.host),
+            clock=self.clock,
         )
         live = LiveServer(live_address(data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
         flight_runner = FlightRunner(
             database,
             data_dir,
-            self._abort_registry,
+            self.abort_registry,
             publish,
-            worker=self._name,
+            worker=self.name,
             closing=closing,
             session=sessions.session,
-            clock=self._clock,
+            clock=self.clock,
         )
         return sessions, flight_runner, live
 
     def _build_job_runners(
         self, database: Database, pool: ComputePool, landscape_pool: ComputePool
     ) -> tuple[JobRunner, ...]:
-        proposer = ProposalJob(database, pool, worker=self._name)
+        proposer = ProposalJob(database, pool, worker=self.name)
         reproducer = ReproductionJob(
-            database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event
+            database, worker=self.name, lease_s=self.settings.lease_s, closing=self.ending.event
         )
-        landscaper = LandscapeJob(database, landscape_pool, worker=self._name, lease_s=self._settings.lease_s)
+        landscaper = LandscapeJob(database, landscape_pool, worker=self.name, lease_s=self.settings.lease_s)
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
@@ -234,22 +233,22 @@ class Worker:
                 kind,
                 perform,
                 room=room,
-                worker=self._name,
-                lease_s=self._settings.lease_s,
-                clock=self._clock,
+                worker=self.name,
+                lease_s=self.settings.lease_s,
+                clock=self.clock,
             )
             for kind, perform, room in performed
         )
 
     def _loop(self, database: Database, claim: Callable[[], None]) -> None:
         with DatabaseWatch(database.file) as watch:
-            while not self._ending.event.is_set():
+            while not self.ending.event.is_set():
                 try:
                     claim()
                 except StorageError as error:
                     _log.error("work cannot be claimed", why=str(error))
-                    self._ending.event.wait(self._clock.wall_s(RETRY_S))
-                watch.wait(self._ending.event, LOOK_ANYWAY_S)
+                    self.ending.event.wait(self.clock.wall_s(RETRY_S))
+                watch.wait(self.ending.event, LOOK_ANYWAY_S)
 
     def _claim(
         self,
@@ -260,7 +259,7 @@ class Worker:
         job_runners: Sequence[JobRunner],
         computing: Executor,
     ) -> None:
-        while len(self._abort_registry.trial_ids()) < FLIGHTS_AT_ONCE and (task := flight_runner.claim()) is not None:
+        while len(self.abort_registry.trial_ids()) < FLIGHTS_AT_ONCE and (task := flight_runner.claim()) is not None:
             flying.submit(flight_runner.carry_out, task)
         while (act := sessions.claim()) is not None:
             acting.submit(sessions.carry_out, act)
@@ -274,8 +273,8 @@ class Worker:
         def refused(error: StorageError) -> None:
             _log.error("the worker cannot start", why=str(error))
 
-        if not self._ending.event.is_set():
-            retry_until_stored(work, refused, closing=self._ending.event, clock=self._clock)
+        if not self.ending.event.is_set():
+            retry_until_stored(work, refused, closing=self.ending.event, clock=self.clock)
 
     def _hello(self) -> WorkerHello:
-        return WorkerHello(pid=os.getpid(), version=__version__, flying=self._abort_registry.trial_ids())
+        return WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids())

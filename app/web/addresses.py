@@ -5,10 +5,10 @@ text for a terminal.
 import io
 import ipaddress
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from app.common.schemas import Schema
 from app.common.settings import is_loopback
 
 EXPOSES: Final = (
@@ -24,9 +24,8 @@ _INTERNAL: Final = ("docker", "br-", "veth", "virbr")
 """Interfaces that lead to containers and virtual machines on this machine only."""
 
 
-@dataclass(frozen=True)
-class Address:
-    """Web address for other devices; `interface` is empty where the server listens on a host given by name."""
+class AddressInfo(Schema):
+    """An address of this server. `interface` is empty where the server listens on a name or on one address."""
 
     url: str
     interface: str
@@ -48,7 +47,7 @@ def exposure(host: str) -> str | None:
     return None if is_loopback(host) else f"Warning: listening on {host}, so {EXPOSES}"
 
 
-def addresses_elsewhere(host: str, port: int) -> list[Address]:
+def addresses_elsewhere(host: str, port: int) -> list[AddressInfo]:
     """Addresses under which other devices reach a server that listens there, the likeliest first; none on loopback.
 
     In a container they are the container's own, which are not reachable from other hosts unless it shares the host's
@@ -58,9 +57,9 @@ def addresses_elsewhere(host: str, port: int) -> list[Address]:
         return []
     version = _EVERYWHERE.get(host)
     if version is None:
-        return [Address(web_address(host, port), "")]
+        return [AddressInfo(url=web_address(host, port), interface="")]
     found = sorted(_own_addresses(version), key=lambda one: one[0].is_link_local)
-    return [Address(web_address(str(address), port), interface) for address, interface in found]
+    return [AddressInfo(url=web_address(str(address), port), interface=interface) for address, interface in found]
 
 
 def is_in_container() -> bool:

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Annotated, BinaryIO, Final, TypeVar
+from typing import Annotated, Any, BinaryIO, Final, TypeVar
 
 from fastapi import Depends, Header, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
@@ -57,26 +57,18 @@ ControlToken = Annotated[
 # These are coroutines and so need no thread: an abort gets through while every thread waits for the database.
 
 
-async def _database(request: Request) -> Database:
-    database: Database = request.app.state.database
-    return database
+def of_app(name: str) -> Any:
+    """Dependency on what the application's state holds under that name."""
+
+    async def read(request: Request) -> Any:
+        return getattr(request.app.state, name)
+
+    return Depends(read)
 
 
-async def _live(request: Request) -> LiveLink:
-    live: LiveLink = request.app.state.live
-    return live
-
-
-CurrentDatabase = Annotated[Database, Depends(_database)]
-Live = Annotated[LiveLink, Depends(_live)]
-
-
-async def _settings(request: Request) -> Settings:
-    settings: Settings = request.app.state.settings
-    return settings
-
-
-CurrentSettings = Annotated[Settings, Depends(_settings)]
+CurrentDatabase = Annotated[Database, of_app("database")]
+Live = Annotated[LiveLink, of_app("live")]
+CurrentSettings = Annotated[Settings, of_app("settings")]
 
 
 async def _request_context(request: Request, settings: CurrentSettings, token: ControlToken = None) -> RequestContext:
@@ -107,13 +99,13 @@ Reader = Annotated[Session, Depends(_reader, scope="function")]
 Writer = Annotated[Session, Depends(_writer, scope="function")]
 
 
+@dataclass(frozen=True, slots=True)
 class IdempotentRequest:
     """Carries out a POST in one transaction, and only once for requests with the same idempotency key."""
 
-    def __init__(self, database: Database, key: str | None, fingerprint: str) -> None:
-        self._database = database
-        self._key = key
-        self._fingerprint = fingerprint
+    database: Database
+    key: str | None
+    fingerprint: str
 
     def __call__(
         self, answer: type[M], work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None
@@ -124,12 +116,12 @@ class IdempotentRequest:
         `ahead` reads and computes before the transaction, so that the write lock is held for a short time only.
         """
         if ahead is not None:
-            with self._database.read() as session:
+            with self.database.read() as session:
                 ahead(session)
-        with self._database.write() as session:
-            if self._key is None:
+        with self.database.write() as session:
+            if self.key is None:
                 return work(session)
-            return carry_out_once(session, self._key, self._fingerprint, answer, work)
+            return carry_out_once(session, self.key, self.fingerprint, answer, work)
 
 
 def fingerprint(request: Request, body_digest: str) -> str:

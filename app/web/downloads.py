@@ -1,11 +1,17 @@
 """Files that are made for one download."""
 
 from collections.abc import Iterator
-from typing import IO, Final
+from typing import IO, Any, Final
 
 from fastapi.responses import StreamingResponse
 
 _CHUNK_BYTES: Final = 2**20
+
+
+def described(*types: str, binary: bool = True) -> dict[int | str, dict[str, Any]]:
+    """Description of a response that is a file of one of these media types, for OpenAPI."""
+    schema = {"type": "string", "format": "binary"} if binary else {"type": "string"}
+    return {200: {"content": {each: {"schema": schema} for each in types}}}
 
 
 def download(file: IO[bytes], name: str, *, media_type: str) -> StreamingResponse:

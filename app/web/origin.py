@@ -8,6 +8,7 @@ vehicle must also present a key (`app.accounts.keys_and_links`).
 
 import ipaddress
 from collections.abc import Callable, Iterator
+from dataclasses import KW_ONLY, dataclass
 from typing import Final
 from urllib.parse import urlsplit
 
@@ -34,6 +35,7 @@ _FORWARDED_BEGINS: Final = (
 """Headers that proxies and tunnels add, and browsers do not."""
 
 
+@dataclass(frozen=True, slots=True)
 class AccessMiddleware:
     """Refuses requests under a foreign host name, API requests from another site's pages, and changes without a key for
     them.
@@ -42,46 +44,39 @@ class AccessMiddleware:
     `refuse` from one of the application's errors.
     """
 
-    def __init__(
-        self,
-        app: ASGIApp,
-        *,
-        host: str,
-        refuse_foreign: Callable[[str, str], Response],
-        refuse: Callable[[GainlineError], Response],
-    ) -> None:
-        self._app = app
-        self._host = host.lower()
-        self._refuse_foreign = refuse_foreign
-        self._refuse = refuse
+    app: ASGIApp
+    _: KW_ONLY
+    host: str
+    refuse_foreign: Callable[[str, str], Response]
+    refuse: Callable[[GainlineError], Response]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http" and (refusal := self._refusal(scope)) is not None:
             await refusal(scope, receive, send)
             return
-        await self._app(scope, receive, send)
+        await self.app(scope, receive, send)
 
     def _refusal(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
         address = headers.get("host", "")
         name = _name_of(address)
-        if name not in {"localhost", self._host} and not _is_ip_address(name):  # DNS rebinding needs a name
-            return self._refuse_foreign(
+        if name not in {"localhost", self.host.lower()} and not _is_ip_address(name):  # DNS rebinding needs a name
+            return self.refuse_foreign(
                 f"This server does not accept requests for the host name “{address}”.",
                 "Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
             )
         path: str = scope["path"]
         changes = scope["method"] not in _READS
         if (changes or path.startswith("/api/")) and _is_foreign(headers, address):
-            return self._refuse_foreign(
+            return self.refuse_foreign(
                 "The request came from a page of another site and was rejected.",
                 "Use the dashboard, or send the request from a program without the header Origin.",
             )
         if changes or path.endswith(_COSTLY):
             try:
-                require(Permission.CHANGE, read_caller(scope, host=self._host))
+                require(Permission.CHANGE, read_caller(scope, host=self.host))
             except NotAllowedError as error:
-                return self._refuse(error)
+                return self.refuse(error)
         return None
 
 

@@ -14,20 +14,13 @@ from app.common.schemas import Schema
 from app.db.backup import database_bytes, take_backup
 from app.db.migrate import revision_of
 from app.db.trajectories import require_intact
-from app.web.addresses import EXPOSES, addresses_elsewhere, exposure, is_in_container, qr_svg
+from app.web.addresses import EXPOSES, AddressInfo, addresses_elsewhere, exposure, is_in_container, qr_svg
 from app.web.dependencies import CurrentDatabase, CurrentSettings, Live
-from app.web.downloads import download
+from app.web.downloads import described, download
 
 router = APIRouter(prefix="/api/system", tags=["system"])
 
 _SQLITE: Final = "application/vnd.sqlite3"
-
-
-class AddressInfo(Schema):
-    """An address of this server. `interface` is empty where the server listens on a name or on one address."""
-
-    url: str
-    interface: str
 
 
 class System(Schema):
@@ -68,11 +61,7 @@ def get_system(request: Request, settings: CurrentSettings, database: CurrentDat
     )
 
 
-@router.get(
-    "/qr.svg",
-    response_class=Response,
-    responses={200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}},
-)
+@router.get("/qr.svg", response_class=Response, responses=described("image/svg+xml", binary=False))
 def get_address_code(
     request: Request,
     settings: CurrentSettings,
@@ -88,11 +77,7 @@ def get_address_code(
     return Response(qr_svg(address), media_type="image/svg+xml")
 
 
-@router.get(
-    "/backup",
-    response_class=StreamingResponse,
-    responses={200: {"content": {_SQLITE: {"schema": {"type": "string", "format": "binary"}}}}},
-)
+@router.get("/backup", response_class=StreamingResponse, responses=described(_SQLITE))
 def get_backup(database: CurrentDatabase) -> StreamingResponse:
     """The whole database at this moment, as one SQLite file; flights and computations continue meanwhile.
 
@@ -105,5 +90,4 @@ def get_backup(database: CurrentDatabase) -> StreamingResponse:
 
 def _addresses(request: Request, settings: CurrentSettings) -> list[AddressInfo]:
     _, port = request.scope["server"]
-    found = addresses_elsewhere(settings.host, port)
-    return [AddressInfo(url=each.url, interface=each.interface) for each in found]
+    return addresses_elsewhere(settings.host, port)

@@ -6,7 +6,7 @@ from typing import Final
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.campaigns.trials.schemas import TrialPhoto
 from app.common.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
 from app.db.models import TrialPhotoRow, TrialRow
@@ -46,7 +46,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
     Raises NotFoundError; TooLargeError, MediaTypeError or InputError when the content is not an acceptable photo;
     ConflictError when the trial has the maximum number of photos.
     """
-    trial = repository.get_trial(session, trial_id)
+    trial = history.trial_row(session, trial_id)
     if len(content) > MAX_BYTES:
         size = f"{MAX_BYTES / 2**20:g} MiB"
         raise TooLargeError(
@@ -70,12 +70,14 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
     row = TrialPhotoRow(trial=trial, media_type=media_type, data=content)
     session.add(row)
     session.flush()
-    return _view(row)
+    return TrialPhoto.view_of(row)
 
 
 def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:
     """Photos of a trial in the order in which they were added. Raises NotFoundError."""
-    return [_view(row) for row in repository.photos_of_trial(session, repository.get_trial(session, trial_id).id)]
+    return [
+        TrialPhoto.view_of(row) for row in repository.photos_of_trial(session, history.trial_row(session, trial_id).id)
+    ]
 
 
 def photos_of_campaign(session: Session, campaign_id: int) -> list[tuple[TrialPhotoRow, int]]:
@@ -105,11 +107,7 @@ def delete_photo(session: Session, trial_id: int, photo_id: int) -> None:
 
 
 def _one(session: Session, trial_id: int, photo_id: int) -> TrialPhotoRow:
-    row = repository.photo_or_none(session, photo_id)
+    row = session.get(TrialPhotoRow, photo_id)
     if row is None or row.trial_id != trial_id:
         raise NotFoundError("photo", photo_id)
     return row
-
-
-def _view(row: TrialPhotoRow) -> TrialPhoto:
-    return TrialPhoto.view_of(row)

@@ -20,7 +20,7 @@ from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.campaigns.trials.schemas import Trial, TrialPlan
-from app.campaigns.trials.service import Predict, check_flown_gains, create_trial, require_open
+from app.campaigns.trials.service import Predict, create_trial, gated_gains, require_open
 from app.campaigns.trials.views import trajectory_view, trial_view
 from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
@@ -88,8 +88,8 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
             problems=(Problem("confirm", f"the log was flown with {held}"),),
         )
     row.read_back = dict(flown.gains)
-    judged = check_flown_gains(session, campaign, flown.gains)
-    row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
+    row.gains, gate = gated_gains(session, campaign, flown.gains)
+    row.gate, row.kind = proposals.gate_json(gate), "manual"
     row.predicted_error = row.predicted_interval = None
     if (curve := row.predicted) is not None:
         row.predicted = None
@@ -255,7 +255,7 @@ def import_record(
     that is not `confirmed`, or when it cannot be scored and nobody has asked to store it as `invalid`, TrajectoryError
     when the record cannot be stored, NotAllowedError when the client may not command a real vehicle.
     """
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
     check_action(TRIAL_ACTIONS, "upload", row.state, f"Flight {row.number}")
@@ -332,47 +332,31 @@ def import_into_campaign(
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
     """Thinned record of a trial. Raises NotFoundError when there is none, StorageError when it is damaged."""
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     return trajectory_view(campaigns.get_row(session, row.campaign_id), row, history.record_of(session, row), points)
 
 
-@dataclass(frozen=True, slots=True)
-class Export:
-    """A full record as CSV."""
-
-    file_name: str
-    csv: str
-    checksum: str
-
-
-def export_trajectory(session: Session, trial_id: int) -> Export:
-    """Export every sample with nine digits, which restore the stored single-precision number exactly."""
-    row = repository.get_trial(session, trial_id)
+def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:
+    """File name, CSV and checksum of a full record: every sample with nine digits, which restore the stored
+    single-precision number exactly."""
+    row = history.trial_row(session, trial_id)
     record = history.record_of(session, row)
     assert row.trajectory is not None
     table = np.column_stack([record.time_s, *record.channels.values()])
     lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
-    return Export(
-        f"campaign-{row.campaign_id}-trial-{row.number}.csv", "\n".join(lines) + "\n", row.trajectory.checksum
-    )
+    name = f"campaign-{row.campaign_id}-trial-{row.number}.csv"
+    return name, "\n".join(lines) + "\n", row.trajectory.checksum
 
 
-@dataclass(frozen=True, slots=True)
-class TelemetryLog:
-    """A flight's .tlog and its file name for download."""
-
-    file: Path
-    name: str
-
-
-def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> TelemetryLog:
-    """Telemetry log of the trial's last flight that has one, else the one imported with the trial.
+def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
+    """Telemetry log of the trial's last flight that has one, else the one imported with the trial; and its name for
+    download.
 
     Raises NotFoundError when there is none.
     """
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
     for file in (*flown, log_of_trial(data_dir, trial_id)):
         if file.is_file():
-            return TelemetryLog(file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog")
+            return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"
     raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")

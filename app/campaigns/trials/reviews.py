@@ -3,7 +3,7 @@
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
-from app.campaigns import history, proposals, repository
+from app.campaigns import history, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
@@ -26,7 +26,7 @@ def classify_trial(
     Raises ConflictError when the transition is not in the table or another client changed the trial first, InputError
     when a flight without a usable record is to count, NotAllowedError when the client may not command a real vehicle.
     """
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
     outcome = TrialState(classification.outcome)
@@ -58,7 +58,7 @@ def judge_abort(
     Raises ConflictError when the trial is not aborted, when the program aborted it for a limit, or when another client
     changed the trial first; NotAllowedError when the client may not command a real vehicle.
     """
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
     check_version(

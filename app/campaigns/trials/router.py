@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, Response, status
+from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 
+from app.campaigns.flight_predictions import PredictorCache
 from app.campaigns.schemas import Campaign, ConsideredGains
 from app.campaigns.trials import photos, records, reviews, service
 from app.campaigns.trials.predictions import TrialPredictor
@@ -33,11 +34,13 @@ from app.web.dependencies import (
     RequestContextDep,
     Writer,
     json_only,
+    of_app,
 )
+from app.web.downloads import described
 
 
-async def _trial_predictor(request: Request) -> TrialPredictor:
-    return TrialPredictor(request.app.state.predictors)
+async def _trial_predictor(predictors: Annotated[PredictorCache, of_app("predictors")]) -> TrialPredictor:
+    return TrialPredictor(predictors)
 
 
 TrialPredictorDep = Annotated[TrialPredictor, Depends(_trial_predictor)]
@@ -123,27 +126,17 @@ def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(g
 )
 def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
     """The full record as CSV, every number exactly as stored (single precision, nine digits)."""
-    export = records.export_trajectory(session, trial_id)
-    return Response(
-        export.csv,
-        media_type="text/csv",
-        headers={
-            "Content-Disposition": f'attachment; filename="{export.file_name}"',
-            "X-Checksum-SHA256": export.checksum,
-        },
-    )
+    name, csv, checksum = records.export_trajectory(session, trial_id)
+    headers = {"Content-Disposition": f'attachment; filename="{name}"', "X-Checksum-SHA256": checksum}
+    return Response(csv, media_type="text/csv", headers=headers)
 
 
-@router.get(
-    "/trials/{trial_id}/tlog",
-    response_class=FileResponse,
-    responses={200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}},
-)
+@router.get("/trials/{trial_id}/tlog", response_class=FileResponse, responses=described("application/octet-stream"))
 def get_telemetry_log(session: Reader, settings: CurrentSettings, trial_id: Id) -> FileResponse:
     """The .tlog of the trial's last flight: all messages over the link in both directions, in the format of ground
     stations."""
-    log = records.find_telemetry_log(session, trial_id, settings.data_dir)
-    return FileResponse(log.file, media_type="application/octet-stream", filename=log.name)
+    file, name = records.find_telemetry_log(session, trial_id, settings.data_dir)
+    return FileResponse(file, media_type="application/octet-stream", filename=name)
 
 
 @router.get("/trials/{trial_id}/photos")
@@ -152,11 +145,7 @@ def list_photos(session: Reader, trial_id: Id) -> list[TrialPhoto]:
     return photos.list_photos(session, trial_id)
 
 
-@router.get(
-    "/trials/{trial_id}/photos/{photo_id}",
-    response_class=Response,
-    responses={200: {"content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in photos.ENDINGS}}},
-)
+@router.get("/trials/{trial_id}/photos/{photo_id}", response_class=Response, responses=described(*photos.ENDINGS))
 def get_photo(session: Reader, trial_id: Id, photo_id: Id) -> Response:
     """A picture as uploaded. Its headers keep it from running or loading anything when it is opened by itself."""
     picture = photos.get_picture(session, trial_id, photo_id)

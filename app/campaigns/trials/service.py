@@ -57,17 +57,8 @@ def check_own_gains(
 
     Takes about 0.1 s. Raises GainsError that names what is refused and what would pass.
     """
-    gains, gate = _asked(session, campaign, asked)
+    gains, gate = gated_gains(session, campaign, asked)
     return _judged(campaign, gains, gate, overrule)
-
-
-def check_flown_gains(session: Session, campaign: CampaignRow, flown: Gains) -> GateDecision:
-    """Check gains that were flown elsewhere; returns the gate's result whether or not they pass.
-
-    Raises GainsError when they are not the campaign's gains.
-    """
-    gains, gate = _asked(session, campaign, flown)
-    return GateDecision(gains, proposals.gate_json(gate), "")
 
 
 def evaluate_gate(session: Session, campaign_id: int, asked: Gains) -> Gate:
@@ -75,12 +66,13 @@ def evaluate_gate(session: Session, campaign_id: int, asked: Gains) -> Gate:
 
     Raises GainsError when they are not the campaign's gains, or no controller can hold them.
     """
-    _, gate = _asked(session, campaigns.get_row(session, campaign_id), asked)
+    _, gate = gated_gains(session, campaigns.get_row(session, campaign_id), asked)
     return Gate.model_validate(proposals.gate_json(gate))
 
 
-def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
-    """The gains, complete and in order, and the gate's result."""
+def gated_gains(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
+    """The gains, complete and in order, and the gate's result, whether or not they pass. Raises GainsError when they
+    are not the campaign's gains."""
     definition = definition_of(campaign)
     experiment = experiment_of(definition)
     space = experiment.space.narrowed(definition.bounds)
@@ -99,14 +91,6 @@ def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[
     return gains, gate
 
 
-def check_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> GateDecision:
-    """Decide on a fresh proposal by its stored gate result, which was computed on the same history.
-
-    Raises GainsError as `check_own_gains` does.
-    """
-    return _judged(campaign, proposal.gains, proposals.gate_of(proposal.gate), overrule)
-
-
 def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, overrule: str | None) -> GateDecision:
     reason = require_flyable(gate, overrule=overrule or "", is_real=campaign.vehicle.is_real)
     if reason:
@@ -119,9 +103,9 @@ KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repea
 
 def cancel_trial(session: Session, trial_id: int) -> Trial:
     """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "cancel", row.state, f"Flight {row.number}")
-    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, end=not_begun("the trial was cancelled"))
     set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
@@ -156,7 +140,7 @@ def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str |
 
 def get_trial(session: Session, trial_id: int) -> Trial:
     """Raises NotFoundError."""
-    return _seen(session, repository.get_trial(session, trial_id))
+    return _seen(session, history.trial_row(session, trial_id))
 
 
 Predict = Callable[[Session, CampaignRow, Gains], Proposal | None]
@@ -233,7 +217,7 @@ def find_gains(session: Session, campaign_id: int, new: TrialPlan) -> Gains:
 
 def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     """Change a trial's note. Raises ConflictError when another client changed the trial first."""
-    row = repository.get_trial(session, trial_id)
+    row = history.trial_row(session, trial_id)
     check_version(edit.version, row.version, f"Flight {row.number}", {"note": (row.note, edit.note)})
     row.note = edit.note
     row.version += 1
@@ -258,7 +242,8 @@ def _chosen(session: Session, campaign: CampaignRow, new: TrialPlan) -> tuple[Ga
         assert asked is not None
         return check_own_gains(session, campaign, asked, overrule=new.overrule), None
     proposal = proposals.fresh_proposal(session, campaign, new.proposal_id)
-    return check_proposal(campaign, proposal, overrule=new.overrule), proposal
+    # Its stored gate result was computed on the same history.
+    return _judged(campaign, proposal.gains, proposals.gate_of(proposal.gate), new.overrule), proposal
 
 
 def _of_variant(session: Session, campaign: CampaignRow, variant: Variant, shown: Gains | None) -> Gains:

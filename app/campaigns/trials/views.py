@@ -10,7 +10,7 @@ from typing import Final, Literal
 from sqlalchemy.orm import Session
 
 from app.autopilots.experiments import get_experiment
-from app.campaigns import history, repository
+from app.campaigns import history
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
@@ -106,7 +106,7 @@ def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
 def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
     """Views of some trials of a campaign."""
     session.flush()
-    flights = repository.latest_flights(session, [row.id for row in rows])
+    flights = history.latest_flights(session, [row.id for row in rows])
     field = ReferenceFlights(history.valid_flights(session, campaign.id), experiment_of_campaign(campaign).scatter)
     rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
     return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
@@ -194,8 +194,10 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
     match row.state:
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
-            outcome = f", {_once_more(again)}" if again else f": {compared}"
-            return f"{short(row.error)} {unit}{outcome}{_against_prediction(row, field, unit)}."
+            outcome = f", repeating the gains of {named_flights(again)}" if again else f": {compared}"
+            predicted_error, _ = _prediction(row, field)
+            forecast = "" if predicted_error is None else f"; {short(predicted_error)} {unit} was predicted"
+            return f"{short(row.error)} {unit}{outcome}{forecast}."
         case TrialState.ABORTED:
             return _ended("Aborted", row)
         case TrialState.INVALID:
@@ -221,10 +223,6 @@ def _ended(word: str, row: TrialRow) -> str:
     return cause_text(row.end, word)
 
 
-def _once_more(again: Sequence[int]) -> str:
-    return f"repeating the gains of {named_flights(again)}"
-
-
 def _glitches(row: TrialRow) -> str:
     """Note of the glitches that a person has to look at before classifying the flight."""
     if not row.glitches:
@@ -243,11 +241,6 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
     relation = "lower than" if gain > 0 else "higher than"
     share = f" ({percent(abs(gain) / best)})" if best else ""
     return f"{short(abs(gain))} {unit}{share} {relation} {than}"
-
-
-def _against_prediction(row: TrialRow, field: ReferenceFlights, unit: str) -> str:
-    predicted_error, _ = _prediction(row, field)
-    return "" if predicted_error is None else f"; {short(predicted_error)} {unit} was predicted"
 
 
 def _record(trial: TrialRow) -> RecordBrief | None:
