@@ -10,8 +10,13 @@ LIMIT = FlightEnd(failure=Failure.ENVELOPE, remarks=("It rose to 4.6 m.",))
 RESTORED = "It landed the vehicle and restored the safe gains."
 
 
-def aborted(request: StopRequest, *remarks: str, **fields: Landing | GainsLeft) -> FlightEnd:
-    return FlightEnd(failure=Failure.OPERATOR, request=request, remarks=remarks, **fields)  # type: ignore[arg-type]
+def aborted(
+    request: StopRequest,
+    *remarks: str,
+    landed: Landing = Landing.LANDED,
+    gains_left: GainsLeft = GainsLeft.UNKNOWN,
+) -> FlightEnd:
+    return FlightEnd(failure=Failure.OPERATOR, request=request, remarks=remarks, landed=landed, gains_left=gains_left)
 
 
 @pytest.mark.parametrize(

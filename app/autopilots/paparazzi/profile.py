@@ -1,6 +1,7 @@
 """Paparazzi: MAVLink 1, flight plan blocks instead of modes, integer gains."""
 
 from collections.abc import Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -48,13 +49,17 @@ def _explore(ask: Ask, target: Target) -> Mapping[str, int]:
     blocks: dict[str, int] = {}
     for seq in range(counted.count):
         request = Outgoing("SCRIPT_REQUEST", _to(target) | {"seq": seq})
-        found = ask(request, lambda reply, seq=seq: isinstance(reply, Block) and reply.number == seq)  # type: ignore[misc]
+        found = ask(request, partial(_is_block, seq))
         if not isinstance(found, Block):
             raise _without_blocks(f"It did not name block {seq} of {counted.count}.")
         blocks.setdefault(found.name, found.number)
     if missing := [name for name in BLOCKS if name not in blocks]:
         raise _without_blocks(f"Its flight plan has no block {', '.join(missing)}.")
     return blocks
+
+
+def _is_block(number: int, reply: Measurement) -> bool:
+    return isinstance(reply, Block) and reply.number == number
 
 
 def _conclude(target: Target) -> tuple[Outgoing, ...]:

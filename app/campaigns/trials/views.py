@@ -205,7 +205,8 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
         case TrialState.LOST:
             return _ended("Lost", row)
         case TrialState.CAPTURED:
-            doubt = f"; the measurement is doubtful: {reason_of(row)}" if reason_of(row) else ""
+            reason = reason_of(row)
+            doubt = f"; the measurement is doubtful: {reason}" if reason else ""
             return f"Landed and recorded{_glitches(row)}{doubt}. Review the flight."
         case _:
             return ""
