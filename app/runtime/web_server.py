@@ -11,6 +11,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
+import plotly  # noqa: F401, TID253
+import scipy  # noqa: F401, TID253
 import structlog
 import uvicorn
 
@@ -27,8 +29,10 @@ STREAMS_END_WITHIN_S: Final = 3
 TICKS_A_SECOND: Final = 10
 WITHOUT_DESCRIPTORS_S: Final = 0.05
 NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
+"""What charts and statistics need. Their packages are loaded above, before threads do: Python 3.11 fails to import a
+module of a package of which another thread is just ending the import (KeyError)."""
 NUMERICS_AFTER_S: Final = 5.0
-"""How long after it is ready the server imports what charts and statistics need, if no request has done so by then."""
+"""How long after it is ready the server imports them, if no request has done so by then."""
 
 _log = structlog.get_logger(__name__)
 

@@ -80,6 +80,11 @@ def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
     assert not imported("import app.runtime.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
 
 
+def test_requests_never_find_a_package_that_another_thread_is_importing() -> None:
+    """Python 3.11 takes a package out of `sys.modules` for a moment when its import ends."""
+    assert imported("import app.runtime.web_server").issuperset(("plotly", "scipy"))
+
+
 @pytest.mark.complete
 def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:
     """Each file has a separate process, whose start the sender of the file waits for."""
