@@ -267,6 +267,15 @@ def sim_drone(
         int, typer.Option(min=0, help="Seed of the first flight; each later flight uses the next seed.")
     ] = 1,
     speed: Annotated[float, typer.Option(help="Speed of simulated time relative to real time.")] = 1.0,
+    catch_up_s: Annotated[
+        float,
+        typer.Option(
+            "--catch-up",
+            min=0.05,
+            metavar="SECONDS",
+            help="Longest lag of simulated time that is caught up on a busy computer; a longer one is lost.",
+        ),
+    ] = 2.0,
     fault: Annotated[
         list[str] | None,
         typer.Option(
@@ -305,6 +314,7 @@ def sim_drone(
         settings=settings or [],
         seed=seed,
         speed=speed,
+        catch_up_s=catch_up_s,
         faults=fault or [],
         system=system,
         failsafes=failsafes,

@@ -27,6 +27,7 @@ def run_sim_drone(
     settings: Sequence[str],
     seed: int,
     speed: float,
+    catch_up_s: float,
     faults: Sequence[str],
     system: int | None,
     failsafes: bool,
@@ -52,7 +53,7 @@ def run_sim_drone(
         outlet = None if seen_at is None else opened.enter_context(closing(open_outlet(seen_at)))
         drone = Drone(body, lambda fresh: switch_on(fresh, number), planned, outlet)
         transport = opened.enter_context(closing(open_transport(address)))
-        server = Server(drone, transport, clock)
+        server = Server(drone, transport, clock, catch_up_s=catch_up_s)
         out = console()
         out.print(f"{kind.title}, system {number}, flight model {vehicle}, on {address}.")
         if seen_at is not None:

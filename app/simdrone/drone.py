@@ -81,20 +81,24 @@ class Drone:
         return self._codecs[key].pack(self.autopilot.dialect.message(message.kind, message.fields))
 
 
-LARGEST_LAG_S: Final = 2.0
-"""Lag of vehicle time that is caught up on a busy machine; a longer lag is lost, and the drone's clock stays late."""
+CATCH_UP_S: Final = 2.0
 TICKS_AT_ONCE: Final = 8
 """Maximum number of ticks between two reads of the link while catching up."""
 _SHORTEST_WAIT_S: Final = 0.0005
 
 
 class Server:
-    """Runs one drone on one transport until it is stopped. The owner of the transport closes it."""
+    """Runs one drone on one transport until it is stopped. The owner of the transport closes it.
 
-    def __init__(self, drone: Drone, transport: Transport, clock: Clock) -> None:
+    A lag of vehicle time of up to `catch_up_s` is caught up on a busy machine; a longer one is lost, and the drone's
+    clock stays late.
+    """
+
+    def __init__(self, drone: Drone, transport: Transport, clock: Clock, *, catch_up_s: float = CATCH_UP_S) -> None:
         self._drone = drone
         self._transport = transport
         self._clock = clock
+        self._catch_up_s = catch_up_s
         self._stopping = threading.Event()
         self.lost_s = 0.0
         """Vehicle time lost because the machine was too slow for this speed."""
@@ -104,10 +108,10 @@ class Server:
         start_s = self._clock.now_s()
         while not self._stopping.is_set():
             behind_s = self._clock.now_s() - start_s - self._drone.time_s
-            if behind_s > LARGEST_LAG_S:
-                self.lost_s += behind_s - LARGEST_LAG_S
-                start_s += behind_s - LARGEST_LAG_S
-                behind_s = LARGEST_LAG_S
+            lost_s = max(0.0, behind_s - self._catch_up_s)
+            self.lost_s += lost_s
+            start_s += lost_s
+            behind_s -= lost_s
             self._receive(self._clock.wall_s(TICK_S - behind_s))
             for _ in range(min(int(behind_s / TICK_S), TICKS_AT_ONCE)):
                 self._send(self._drone.tick())

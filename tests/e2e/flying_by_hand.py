@@ -10,8 +10,7 @@ from tests.runtime.drones import TRIED, Drone
 
 DRONE_SPEED = 2.0
 """Of the drone's time: a flight takes 17 s. The ground's time is real, so the drone is never late. A stall of
-the machine is so many times longer in the drone's time, and its clock may gain 2 s on the ground's: at 8, a stall of
-0.45 s was taken for a clock that had stopped."""
+the machine is so many times longer in the drone's time: at 8, one of 0.45 s was taken for a clock that had stopped."""
 HOLD_MS = 2000
 """What a hold takes, by the page's clock."""
 ASK_MS = 1000

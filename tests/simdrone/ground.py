@@ -15,7 +15,7 @@ from typing import Any, Final, Protocol
 from app.autopilots.simulated.body import TICK_S, Make
 from app.core.clock import Clock, ScaledClock
 from app.simdrone.body import new_body
-from app.simdrone.drone import Drone, Server
+from app.simdrone.drone import CATCH_UP_S, Drone, Server
 from app.simdrone.faults import parse_fault
 from app.simdrone.motion_capture import MocapOutput
 from app.simdrone.registry import get_autopilot
@@ -215,11 +215,13 @@ def switched_on(
 
 
 @contextlib.contextmanager
-def served(autopilot: str, link: str, *, clock: Clock | None = None, **settings: Any) -> Iterator[Drone]:
+def served(
+    autopilot: str, link: str, *, clock: Clock | None = None, catch_up_s: float = CATCH_UP_S, **settings: Any
+) -> Iterator[Drone]:
     """A drone on this link, in a separate thread, with the settings of `switched_on`."""
     drone = switched_on(autopilot, **settings)
     transport = open_transport(parse(link))
-    server = Server(drone, transport, clock or ScaledClock(SPEED))
+    server = Server(drone, transport, clock or ScaledClock(SPEED), catch_up_s=catch_up_s)
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
