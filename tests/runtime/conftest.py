@@ -11,4 +11,5 @@ from tests.runtime.processes import Serving
 @pytest.fixture(scope="package")
 def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     with Serving(tmp_path_factory.mktemp("serving") / "data") as one:
+        one.worker_pid()  # what is asked for before its worker works is withdrawn
         yield one
