@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.experiments import EXPERIMENTS
 from app.core.analysis.analysis import Analysis
-from app.core.control.ardupilot_parameters import in_older_names
 from app.core.definition import LogEvidence
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.copter_steps import CopterSteps, vector_of

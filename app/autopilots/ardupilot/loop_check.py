@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.replica.log import LogComparison, LoopLog, compare_log
+from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
+from app.autopilots.ardupilot.replica.vertical import OUTPUTS
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
 from app.autopilots.loop_check import LoopCheck, Result, Signal, TraceReplay, Upload, grouped, result_of_trace
-from app.core.control.ardupilot import OUTPUTS
-from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
-from app.core.control.ardupilot_replay import LoopTrace, replayed
 from app.logs.formats import Format
 
 _PRECISION: Final = "firmware and recording have single precision"

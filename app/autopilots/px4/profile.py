@@ -13,8 +13,7 @@ from app.autopilots.gains import on_board
 from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
-from app.autopilots.simulated.body import SimulatedKind
-from app.core.control.px4_parameters import (
+from app.autopilots.px4.replica.parameters import (
     ESTIMATOR_NAMES,
     HOVER_RANGE_NAME,
     LOOP_NAMES,
@@ -22,6 +21,7 @@ from app.core.control.px4_parameters import (
     hover_deviation,
     hover_limits,
 )
+from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import InputError
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"

@@ -9,7 +9,7 @@ from typing import Final
 
 from app.autopilots.autopilot import Requirement
 from app.autopilots.measurements import VehicleEvent
-from app.core.control.px4_parameters import HOVER_THRUSTS
+from app.autopilots.px4.replica.parameters import HOVER_THRUSTS
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import (

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.px4 import (
+from app.autopilots.px4.replica.parameters import Parameters
+from app.autopilots.px4.replica.vertical import (
     ACCELERATION_TARGET,
     DERIVATIVE,
     FLIGHT,
@@ -31,7 +32,6 @@ from app.core.control.px4 import (
     start,
     sum_of_given,
 )
-from app.core.control.px4_parameters import Parameters
 from app.core.records.trajectory import Samples
 
 COMPARED: Final = ("out_vz_m_s", "out_az_m_s2", "out_thrust")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import Parameters
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.records.trajectory import Samples
 
 

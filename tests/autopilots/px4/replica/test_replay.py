@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from app.autopilots.px4.replica.log import COMPARED, LoopLog, replica_of
+from app.autopilots.px4.replica.vertical import FLIGHT, INPUTS, OUTPUTS
 from app.autopilots.px4.trace import read_px4_trace
-from app.core.control.px4 import FLIGHT, INPUTS, OUTPUTS
-from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.records.trajectory import Samples
 
-FLIGHTS = Path(__file__).parents[2] / "data" / "px4_loop"
+FLIGHTS = Path(__file__).parents[3] / "data" / "px4_loop"
 EVERY = 12
 
 

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control import px4 as loop
-from app.core.control.px4_parameters import Packed, Parameters
+from app.autopilots.px4.replica import vertical as loop
+from app.autopilots.px4.replica.parameters import Packed, Parameters
 from app.core.records.trajectory import Samples
 
 

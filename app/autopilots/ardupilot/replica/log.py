@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.ardupilot import A_D, STATE_SIZE, V_D, Z_D, shape
-from app.core.control.ardupilot_parameters import Parameters
-from app.core.control.ardupilot_shaping import square_root
+from app.autopilots.ardupilot.replica.parameters import Parameters
+from app.autopilots.ardupilot.replica.shaping import square_root
+from app.autopilots.ardupilot.replica.vertical import A_D, STATE_SIZE, V_D, Z_D, shape
 from app.core.records.trajectory import Samples
 
 SHAPED: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
