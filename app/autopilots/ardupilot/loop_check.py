@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.replica.log import LogComparison, LoopLog, compare_log
-from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
+from app.autopilots.ardupilot.replica.replay import LogComparison, LoopLog, LoopTrace, compare_log, replayed
 from app.autopilots.ardupilot.replica.vertical import OUTPUTS
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history
-from app.autopilots.ardupilot.replica.log import LoopLog
 from app.autopilots.ardupilot.replica.parameters import (
     FIRMWARE_NAMES,
     LOOP_RATE,
@@ -17,6 +16,7 @@ from app.autopilots.ardupilot.replica.parameters import (
     UNSUPPORTED,
     parameters_from,
 )
+from app.autopilots.ardupilot.replica.replay import LoopLog
 from app.autopilots.recording import Column, Recording, refusal
 from app.core.errors import InputError
 from app.core.records.trajectory import Samples

@@ -19,8 +19,7 @@ from app.autopilots.loop_check import (
     result_of_trace,
 )
 from app.autopilots.px4.log import read_px4
-from app.autopilots.px4.replica.log import COMPARED, LoopLog, replica_of
-from app.autopilots.px4.replica.replay import LoopTrace, Replay, replayed
+from app.autopilots.px4.replica.replay import COMPARED, LoopLog, LoopTrace, Replay, replayed, replica_of
 from app.autopilots.px4.replica.vertical import OUTPUTS
 from app.autopilots.px4.replica_check import px4_loop_log
 from app.autopilots.px4.trace import is_px4_trace, read_px4_trace

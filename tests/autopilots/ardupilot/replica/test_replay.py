@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.replica.log import COMPARED, SHAPED, LogComparison, LoopLog, compare_log
+from app.autopilots.ardupilot.replica.replay import COMPARED, SHAPED, LogComparison, LoopLog, compare_log
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from tests.logs.recorded import recorded
 

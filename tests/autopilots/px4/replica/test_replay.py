@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.autopilots.px4.replica.log import COMPARED, LoopLog, replica_of
+from app.autopilots.px4.replica.replay import COMPARED, LoopLog, replica_of
 from app.autopilots.px4.replica.vertical import FLIGHT, INPUTS, OUTPUTS
 from app.autopilots.px4.trace import read_px4_trace
 from app.core.records.trajectory import Samples
