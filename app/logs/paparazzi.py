@@ -11,7 +11,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.core.control.loop_log import FIELDS, LoopLog
-from app.core.control.paparazzi import INT32_MAX, INT32_MIN
+from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 from app.logs.base import refused
 
 _MAX_SAMPLES: Final = 2_000_000

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.paparazzi.trace import read_loop_trace
-from app.core.control.paparazzi import OUTPUTS, RATE_HZ, LoopTrace, Replay, compared, replayed
+from app.core.control.vertical_guidance import OUTPUTS, RATE_HZ, LoopTrace, Replay, compared, replayed
 from app.figures.panels import Panel, Plot
 from app.reproductions.results import Progress, Result, Row, curve
 

@@ -35,7 +35,7 @@ from app.core.control.loop_log import (
     compare_commands,
     compare_simulation,
 )
-from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
+from app.core.control.vertical_guidance import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
 from app.logs.base import refused

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control import paparazzi as loop
+from app.core.control import vertical_guidance as loop
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
 

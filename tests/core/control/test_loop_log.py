@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.paparazzi.log import read_paparazzi
-from app.core.control import paparazzi as loop
+from app.core.control import vertical_guidance as loop
 from app.core.control.loop_log import (
     FIELDS,
     CommandCheck,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.paparazzi.trace import read_loop_trace
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     FB_CMD,
     FF_CMD,
     FULL_THRUST,
