@@ -19,6 +19,7 @@ from app.autopilots.loop_check import (
     result_of_trace,
     signal_result,
 )
+from app.autopilots.paparazzi.ground_log import HINT
 from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
 from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
 from app.core.control.loop_log import (
@@ -40,7 +41,6 @@ from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
 from app.logs.base import refused
 from app.logs.formats import Format
-from app.logs.paparazzi import HINT
 
 _MAX_DIGITS: Final = 9
 
@@ -247,7 +247,7 @@ CHECK: Final = LoopCheck(
         {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
     ),
     note=_DOWN,
-    log=Format.PAPARAZZI,
+    log=Format.GROUND_LOG,
     is_trace=may_be_loop_trace,
     examine_log=_examine_log,
     examine_trace=_examine_trace,
