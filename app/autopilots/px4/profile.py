@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.autopilots import commands, mavlink
-from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, Requirement
+from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, HoverLimits, Requirement
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import on_board
@@ -16,6 +16,7 @@ from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
 from app.autopilots.px4.replica.parameters import (
     ESTIMATOR_NAMES,
     HOVER_RANGE_NAME,
+    HOVER_THRUSTS,
     LOOP_NAMES,
     UNSUPPORTED,
     hover_deviation,
@@ -48,13 +49,16 @@ _STREAMED_FOR_S: Final = 1.2
 """It accepts the offboard mode once set points have arrived for a second."""
 
 
-def _hover_limits(parameters: Mapping[str, float]) -> tuple[float, float] | None:
+def _hover_limits(parameters: Mapping[str, float]) -> HoverLimits | None:
     """Return those of its estimator; None if its parameter is not known."""
-    assumed = parameters.get(_HOVER)
+    if _HOVER not in parameters:
+        return None
     try:
-        return None if assumed is None else hover_limits(assumed, hover_deviation(parameters))
+        low, high = hover_limits(parameters[_HOVER], hover_deviation(parameters))
     except InputError as error:
         raise AutopilotError(str(error), hint=f"Correct {HOVER_RANGE_NAME} on the vehicle, then try again.") from error
+    words = f"within {_HOVER} ± {HOVER_RANGE_NAME}, {low:.2f} … {high:.2f}: PX4's estimate stops there"
+    return HoverLimits(low, high, words, _HOVER, HOVER_THRUSTS[1])
 
 
 def _steps(action: Action, target: Target) -> tuple[Step, ...]:
