@@ -23,6 +23,7 @@ from app.flights.flight_loop import (
     hold_vehicle_lock,
     internal_error,
 )
+from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
 from app.flights.process_messages import (
     CommandForwarded,
     ConnectionOpened,
@@ -36,7 +37,6 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
-from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
 from app.live.messages import SILENT_AFTER_S, FlightPhase, Telemetry, UnreadyReason, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (

@@ -20,7 +20,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.session import RETRY_S, Database, retry_until_stored
 from app.flights import flight_rows
 from app.flights.abort import AbortFlag, AbortRegistry
-from app.flights.flight_process import FlightProcess, FlightProcessPool
+from app.flights.flight_process import FlightProcess, FlightProcessPool, VehicleConnection
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
     FlightFailure,
@@ -31,7 +31,6 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
-from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.end_texts import end_text
