@@ -39,6 +39,7 @@ from app.flights.process_messages import (
     FlightMessage,
     FlightRequest,
     FromVehicleProcess,
+    Publish,
     StagingLost,
     TakeOffCommand,
     ToVehicleProcess,
@@ -46,7 +47,7 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
-from app.live.messages import NO_LINK, SILENT_AFTER_S, VehicleCommandKind, VehicleStatus
+from app.live.messages import NO_LINK, SILENT_AFTER_S, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
 from app.vehicles.base import SafeGainsError, VehicleError
 from app.vehicles.flight_end import StopRequest
@@ -94,8 +95,8 @@ class FlightProcess:
     def pid(self) -> int | None:
         return self._child.pid
 
-    def fly(self, request: FlightRequest) -> Iterator[FlightMessage]:
-        """Send the request and yield the process's messages until it is free again.
+    def fly(self, request: FlightRequest, publish: Publish) -> Iterator[FlightMessage]:
+        """Send the request, publish telemetry and phases, and yield the other messages until the process is free again.
 
         The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
         """
@@ -104,7 +105,10 @@ class FlightProcess:
             self._post(request)
             while not isinstance(message := self._next(), FlightFinished):
                 assert isinstance(message, FlightMessage), message
-                yield message
+                if isinstance(message, Telemetry | FlightPhase):
+                    publish(message)
+                else:
+                    yield message
         finally:
             self.trial_id = None
 

@@ -31,7 +31,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
-from app.live.messages import FlightPhase, Phase, Telemetry
+from app.live.messages import FlightPhase, Phase
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind
@@ -149,10 +149,8 @@ class FlightRunner:
         try:
             self._phase(request, "staging")
             flag.add_listener(lambda stop: backend.cancel_flight(request.trial_id, stop))
-            for message in backend.fly(request):
+            for message in backend.fly(request, self._publish):
                 match message:
-                    case Telemetry() | FlightPhase():
-                        self._publish(message)
                     case GainsStaged(read_back):
                         ended = self._staged(request, flag, backend, read_back)
                     case FlightLanded(record):
