@@ -15,7 +15,7 @@ from app.common.data_folder import vehicle_lock
 from app.flights.flight_loop import FlightMonitor
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
-from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
+from app.live.messages import MAX_LINE_BYTES, FlightPhase, PublishedMessage, Telemetry, encode
 from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
@@ -58,7 +58,8 @@ def fly(
 ) -> list[FlightMessage]:
     heard: list[FlightMessage] = []
 
-    def hear(said: FlightMessage) -> None:
+    def hear(said: FlightMessage | PublishedMessage) -> None:
+        assert isinstance(said, FlightMessage)
         heard.append(said)
         on_said(said)
 
