@@ -9,8 +9,7 @@ from typing import BinaryIO, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.loop_log import Overlay
-from app.core.records.overlaid import Overlaid
+from app.core.records.overlaid import Overlaid, Overlay
 from app.core.records.trajectory import Samples, select_samples
 from app.logs.formats import Format
 

@@ -9,7 +9,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.core.control.loop_log import FIELDS, LoopLog
+from app.autopilots.paparazzi.replica.loop_log import FIELDS, LoopLog
 from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 from app.logs.base import refused
 from app.logs.formats import is_ground_log

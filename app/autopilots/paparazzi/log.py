@@ -15,8 +15,8 @@ import numpy as np
 
 from app.autopilots.paparazzi.ground_log import GroundLog, number_in, read_lines
 from app.autopilots.paparazzi.profile import PAPARAZZI
+from app.autopilots.paparazzi.replica.loop_log import GAINS, FlownGains, LoopLog, flown_gains
 from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
-from app.core.control.loop_log import GAINS, FlownGains, LoopLog, flown_gains
 from app.core.control.vertical_guidance import FULL_THRUST
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples

@@ -21,8 +21,7 @@ from app.autopilots.loop_check import (
 )
 from app.autopilots.paparazzi.ground_log import HINT
 from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
-from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
-from app.core.control.loop_log import (
+from app.autopilots.paparazzi.replica.loop_log import (
     COMMANDS,
     GAINS,
     SIMULATED,
@@ -31,14 +30,15 @@ from app.core.control.loop_log import (
     UNITS,
     CommandCheck,
     FlownGains,
-    Overlay,
     SimulationCheck,
     compare_commands,
     compare_simulation,
 )
+from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
 from app.core.control.vertical_guidance import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
+from app.core.records.overlaid import Overlay
 from app.logs.base import refused
 from app.logs.formats import Format
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.paparazzi.log import read_paparazzi
-from app.core.control import vertical_guidance as loop
-from app.core.control.loop_log import (
+from app.autopilots.paparazzi.replica.loop_log import (
     FIELDS,
     CommandCheck,
     FlownGains,
@@ -18,6 +17,7 @@ from app.core.control.loop_log import (
     flown_gains,
     infer_gains,
 )
+from app.core.control import vertical_guidance as loop
 from app.core.policy import Gains
 from tests.logs.paparazzi_flights import Flight, data_of
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from app.core.control import vertical_guidance as loop
 from app.core.policy import Gains
+from app.core.records.overlaid import Overlay
 from app.core.records.trajectory import Samples
 
 FIELDS: Final = (
@@ -126,20 +127,6 @@ class SimulationCheck:
     @property
     def passed(self) -> bool:
         return all(value <= TOLERANCES[name] for name, value in self.largest_difference.items())
-
-
-@dataclass(frozen=True, slots=True)
-class Overlay:
-    """Recorded and replicated signals of the same samples, for plotting.
-
-    `time_s` has shape (n,); `recorded` and `replica` hold each signal by name, shape (n,). `differs` marks the samples
-    without an explanation.
-    """
-
-    time_s: Samples
-    recorded: Mapping[str, Samples | Counts]
-    replica: Mapping[str, Samples | Counts]
-    differs: Mapping[str, NDArray[np.bool_]]
 
 
 def compare_commands(log: LoopLog, flown: Sequence[FlownGains]) -> tuple[CommandCheck, Overlay]:
