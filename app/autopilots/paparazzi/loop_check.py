@@ -21,17 +21,13 @@ from app.autopilots.loop_check import (
 )
 from app.autopilots.paparazzi.ground_log import HINT
 from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
-from app.autopilots.paparazzi.replica.loop_log import (
-    COMMANDS,
-    GAINS,
+from app.autopilots.paparazzi.replica.loop_log import COMMANDS, GAINS, CommandCheck, FlownGains, compare_commands
+from app.autopilots.paparazzi.replica.simulation import (
     SIMULATED,
     TIME_TOLERANCE_S,
     TOLERANCES,
     UNITS,
-    CommandCheck,
-    FlownGains,
     SimulationCheck,
-    compare_commands,
     compare_simulation,
 )
 from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream

@@ -11,12 +11,11 @@ from app.autopilots.paparazzi.replica.loop_log import (
     CommandCheck,
     FlownGains,
     LoopLog,
-    SimulationCheck,
     compare_commands,
-    compare_simulation,
     flown_gains,
     infer_gains,
 )
+from app.autopilots.paparazzi.replica.simulation import SimulationCheck, compare_simulation
 from app.core.control import vertical_guidance as loop
 from app.core.policy import Gains
 from tests.logs.paparazzi_flights import Flight, data_of
