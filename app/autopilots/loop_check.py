@@ -139,6 +139,23 @@ class TraceReplay:
         return replace(self, recorded=recorded, replica=replica)
 
 
+def replay_of_log(
+    log: object,
+    replica: Mapping[str, Samples],
+    time_s: Samples,
+    *,
+    gains: Mapping[str, float],
+    notes: Callable[[Mapping[str, int]], Iterable[str]],
+) -> TraceReplay:
+    """The rows of a log, which has each signal of the replica, at their times, shape (n,), where the replica has a
+    value. `notes` are made of the number of these rows for each signal."""
+    recorded = {name: np.where(np.isfinite(values), getattr(log, name), np.nan) for name, values in replica.items()}
+    rows = {name: int(np.isfinite(values).sum()) for name, values in recorded.items()}
+    return TraceReplay(
+        time_s=time_s - time_s[0], recorded=recorded, replica=replica, gains=gains, notes=tuple(notes(rows))
+    ).compared
+
+
 def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
     """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
     apart = {name: _apart(replay.recorded[name], replay.replica[name]) for name in replay.recorded}

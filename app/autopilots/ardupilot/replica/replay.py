@@ -6,7 +6,7 @@ climb rate target and the demanded throttle. The desired motion advances between
 the next.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,7 +19,6 @@ from app.autopilots.ardupilot.replica.shaping import square_root
 from app.core.records.trajectory import Samples
 
 SHAPED: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
-COMPARED: Final = (*SHAPED, "v_t_m_s", "throttle")
 _LONGEST_INTERVAL_S: Final = 0.5
 
 
@@ -96,29 +95,13 @@ class LoopLog:
     targets: Sequence[tuple[float, float]]
 
 
-@dataclass(frozen=True, slots=True)
-class LogComparison:
-    """Recorded and computed signals by name, shape (n,) each; both are NaN where nothing can be computed."""
-
-    recorded: Mapping[str, Samples]
-    replica: Mapping[str, Samples]
-
-
-def compare_log(log: LoopLog) -> LogComparison:
-    """Compute the signals of `COMPARED` from the row itself, or for `SHAPED` from the row before."""
-    replica = _shaped_again(log) | {
+def replica_of(log: LoopLog) -> dict[str, Samples]:
+    """Signals as the replica computes them from the row itself, or for `SHAPED` from the row before, shape (n,) each;
+    NaN where nothing can be computed."""
+    return _shaped_again(log) | {
         "v_t_m_s": _climb_rate_targets(log),
         "throttle": log.hover + log.control_per_mille / 1000.0,
     }
-    logged = {
-        "z_d_m": log.z_d_m,
-        "v_d_m_s": log.v_d_m_s,
-        "a_d_m_s2": log.a_d_m_s2,
-        "v_t_m_s": log.v_t_m_s,
-        "throttle": log.throttle,
-    }
-    recorded = {name: np.where(np.isfinite(replica[name]), logged[name], np.nan) for name in COMPARED}
-    return LogComparison(recorded, {name: replica[name] for name in COMPARED})
 
 
 def _climb_rate_targets(log: LoopLog) -> Samples:

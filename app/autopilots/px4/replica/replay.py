@@ -17,7 +17,6 @@ from app.autopilots.px4.replica import vertical as loop
 from app.autopilots.px4.replica.parameters import Packed, Parameters
 from app.core.records.trajectory import Samples
 
-COMPARED: Final = ("out_vz_m_s", "out_az_m_s2", "out_thrust")
 _SET_POINTS: Final = [loop.INPUTS.index(name) for name in ("set_z_m", "set_vz_m_s", "set_az_m_s2")]
 _LIMITS: Final = [loop.INPUTS.index(name) for name in ("limit_up_m_s", "limit_down_m_s")]
 _HOVER: Final = loop.INPUTS.index("hover_estimate")
@@ -132,8 +131,7 @@ class LoopLog:
 
 
 def replica_of(log: LoopLog) -> dict[str, Samples]:
-    """The signals of `COMPARED` as the replica computes them in flight, shape (m,) each; NaN where the log does not
-    suffice."""
+    """Signals as the replica computes them in flight, shape (m,) each; NaN where the log does not suffice."""
     return {
         "out_vz_m_s": _velocity_targets(log),
         "out_az_m_s2": _acceleration_targets(log),
