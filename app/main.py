@@ -32,7 +32,7 @@ from app.db.session import Database
 from app.fleet.router import router as fleet
 from app.flights.router import router as flights
 from app.jobs.router import router as jobs
-from app.live.link import live_link
+from app.live.hub import live_link
 from app.log_analyses.router import router as log_analyses
 from app.reports.router import router as reports
 from app.reproductions.router import router as reproductions

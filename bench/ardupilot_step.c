@@ -1,4 +1,4 @@
-/* ArduCopter's vertical loop in flight, one step per row: the loop of app/core/control/ardupilot.py, written the way a C
+/* ArduCopter's vertical loop in flight, one step per row: the loop of app/autopilots/ardupilot/replica/vertical.py, written the way a C
  * programmer would, as the yardstick for the compiled Python. Build with -O2. */
 
 #include <math.h>

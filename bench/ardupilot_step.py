@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import STEP_S, Parameters
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from bench.timing.c_comparison import compiled, is_within_limit
 
 STEPS: Final = 8000

@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 from scipy.signal import find_peaks
 
-from app.core.control.paparazzi import RATE_HZ
+from app.core.control.vertical_guidance import RATE_HZ
 from app.core.experiments.base import Check, Envelope, Matrix, ParameterDistribution, prior_distribution
 from app.core.experiments.takeoff import SET_POINTS, Takeoff
 from app.core.experiments.vertical_loop_hazards import (

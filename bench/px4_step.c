@@ -1,4 +1,4 @@
-/* PX4's vertical loop, one step per row: the loop of app/core/control/px4.py, written the way a C programmer would, as
+/* PX4's vertical loop, one step per row: the loop of app/autopilots/px4/replica/vertical.py, written the way a C programmer would, as
  * the yardstick for the compiled Python. Build with -O2. */
 
 #include <math.h>

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control import px4 as loop
-from app.core.control.px4_parameters import STEP_S, Parameters
+from app.autopilots.px4.replica import vertical as loop
+from app.autopilots.px4.replica.parameters import STEP_S, Parameters
 from bench.timing.c_comparison import compiled, is_within_limit
 
 STEPS: Final = 8000

@@ -61,6 +61,18 @@ class ModeParameter:
     modes: Mapping[float, str]
 
 
+@dataclass(frozen=True, slots=True)
+class HoverLimits:
+    """Least and largest hover throttle that a loop can find in flight, and that in words; they follow from `parameter`,
+    which may be at most `most`."""
+
+    low: float
+    high: float
+    words: str
+    parameter: str
+    most: float
+
+
 class ArmingChecks:
     """Latest results of a vehicle's own arming checks by its events; these are of one that reports them as status texts
     alone."""
@@ -162,10 +174,9 @@ class Autopilot:
     None if the replica of its loop has no parameters but its gains."""
     may_lack: frozenset[str] = frozenset()
     """Those of them that some releases lack, whose replica then has their default."""
-    hover_limits: Callable[[Mapping[str, float]], tuple[float, float] | None] = lambda _parameters: None
-    """Returns the least and the largest hover throttle that its loop can find in flight with these parameters of it;
-    None without such limits: it keeps to what it is told or has learned. Raises AutopilotError for a parameter out of
-    its range."""
+    hover_limits: Callable[[Mapping[str, float]], HoverLimits | None] = lambda _parameters: None
+    """Returns what its loop can find in flight with these parameters of it; None without limits: it keeps to what it is
+    told or has learned. Raises AutopilotError for a parameter out of its range."""
 
     requirements: tuple[Requirement, ...] = ()
     set_point_requirements: tuple[Requirement, ...] = ()

@@ -7,8 +7,9 @@ from typing import Final
 
 from app.autopilots.ardupilot import loop as ardupilot_loop
 from app.autopilots.ardupilot.log import MODES
+from app.autopilots.ardupilot.replica import parameters as ardupilot_parameters
 from app.autopilots.px4 import loop as px4_loop
-from app.core.control import ardupilot_parameters, px4_parameters
+from app.autopilots.px4.replica import parameters as px4_parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

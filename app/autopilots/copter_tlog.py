@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot
+from app.autopilots.ardupilot.replica.parameters import NEWER_NAMES, in_newer_names, in_older_names
 from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
 from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
 from app.autopilots.px4.recorded_flight import px4_loop, read_px4
@@ -20,7 +21,6 @@ from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
 from app.core.analysis.segment import LEAD_S
-from app.core.control.ardupilot_parameters import NEWER_NAMES, in_newer_names, in_older_names
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
 from app.core.records.trajectory import Samples, Trajectory

@@ -9,8 +9,7 @@ from typing import BinaryIO, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.loop_log import Overlay
-from app.core.records.overlaid import Overlaid
+from app.core.records.overlaid import Overlaid, Overlay
 from app.core.records.trajectory import Samples, select_samples
 from app.logs.formats import Format
 
@@ -138,6 +137,23 @@ class TraceReplay:
         names = [name for name, values in self.recorded.items() if np.isfinite(values).any()]
         recorded, replica = ({name: values[name] for name in names} for values in (self.recorded, self.replica))
         return replace(self, recorded=recorded, replica=replica)
+
+
+def replay_of_log(
+    log: object,
+    replica: Mapping[str, Samples],
+    time_s: Samples,
+    *,
+    gains: Mapping[str, float],
+    notes: Callable[[Mapping[str, int]], Iterable[str]],
+) -> TraceReplay:
+    """The rows of a log, which has each signal of the replica, at their times, shape (n,), where the replica has a
+    value. `notes` are made of the number of these rows for each signal."""
+    recorded = {name: np.where(np.isfinite(values), getattr(log, name), np.nan) for name, values in replica.items()}
+    rows = {name: int(np.isfinite(values).sum()) for name, values in recorded.items()}
+    return TraceReplay(
+        time_s=time_s - time_s[0], recorded=recorded, replica=replica, gains=gains, notes=tuple(notes(rows))
+    ).compared
 
 
 def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:

@@ -51,8 +51,10 @@ def autopilot_of(stream: BinaryIO) -> Autopilot | None:
     return _recognised(_head_of(stream))
 
 
-def examine_content(content: bytes, *, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
-    """Check a recording that is in memory, for a process of its own. Raises InputError as `examine` does."""
+def examine_content(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
+    """Check a recording that is in memory, for a process of its own. Raises InputError as `examine` does, and for
+    `gains` that are not KP,KI,KD."""
+    given = None if gains is None else paparazzi.parse_gains(gains)
     beside = None if companion is None else BytesIO(companion)
     return examine(BytesIO(content), name=name, companion=beside, given=given)
 

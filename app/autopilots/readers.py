@@ -9,6 +9,7 @@ from typing import BinaryIO, Final
 from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.copter_tlog import copter_steps
+from app.autopilots.paparazzi.ground_log import HINT as PAPARAZZI_HINT
 from app.autopilots.paparazzi.log import read_paparazzi
 from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
@@ -20,7 +21,6 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.logs.base import refused
 from app.logs.formats import HEAD_BYTES, Format, recognise
-from app.logs.paparazzi import HINT as PAPARAZZI_HINT
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.logs.ulog import HINT as ULOG_HINT
 
@@ -73,7 +73,7 @@ READERS: Final[Mapping[Format, Reader]] = {
         altitude="no vehicle_local_position.z, the altitude",
         hint=ULOG_HINT,
     ),
-    Format.PAPARAZZI: Reader(
+    Format.GROUND_LOG: Reader(
         title="Paparazzi's ground log",
         read=read_paparazzi,
         flight=lambda _recording, _name: None,

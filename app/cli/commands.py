@@ -241,11 +241,13 @@ def reproduce(
 @report_errors
 def sim_drone(
     autopilot: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="Autopilot to simulate: paparazzi, paparazzi-bare, paparazzi-5.10, ardupilot, ardupilot-4.7 or px4."
+            show_default=False,
+            help="Autopilot to simulate: paparazzi, paparazzi-bare, paparazzi-5.10, ardupilot, ardupilot-4.7 or px4. "
+            "[default: paparazzi]",
         ),
-    ] = "paparazzi",
+    ] = None,
     link: Annotated[
         str | None,
         typer.Option(

@@ -19,9 +19,9 @@ from app.autopilots.loop_checks import CHECKS, autopilot_of, examine_file
 from app.autopilots.paparazzi.log import read_paparazzi
 from app.autopilots.paparazzi.loop_check import LogCheck, check_log, parse_gains
 from app.autopilots.paparazzi.profile import PAPARAZZI
+from app.autopilots.paparazzi.replica.simulation import TIME_TOLERANCE_S, TOLERANCES
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
-from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES
 from app.core.formatting import format_gains
 from app.reproductions.controller import run_controller
 from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction

@@ -12,7 +12,7 @@ from app.simdrone.body import new_body
 from app.simdrone.drone import Drone, Server
 from app.simdrone.faults import parse_fault
 from app.simdrone.motion_capture import open_outlet
-from app.simdrone.registry import get_autopilot
+from app.simdrone.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress
@@ -20,7 +20,7 @@ from app.vehicles.mocap.addresses import parse as parse_source
 
 
 def run_sim_drone(
-    autopilot: str,
+    autopilot: str | None,
     *,
     link: str | None,
     vehicle: str,
@@ -38,7 +38,7 @@ def run_sim_drone(
 
     Raises InputError for settings that cannot be used, and LinkError when the link cannot be opened.
     """
-    kind = get_autopilot(autopilot)
+    kind = get_autopilot(autopilot or next(iter(AUTOPILOTS)))
     address = parse(link or kind.link)
     seen_at = None if mocap is None else parse_source(mocap)
     if not any_network:

@@ -97,12 +97,10 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
 
     Raises InputError that names what is wrong with it.
     """
-    from app.autopilots.loop_checks import examine_content  # noqa: PLC0415
-    from app.autopilots.paparazzi.loop_check import parse_gains  # noqa: PLC0415 - imports every replica
+    from app.autopilots.loop_checks import examine_content  # noqa: PLC0415 - imports every replica
 
-    given = None if gains is None else parse_gains(gains)
     return run_limited(
-        FILE, examine_content, content, name=uploaded_name(name, unnamed=_UNNAMED), companion=companion, given=given
+        FILE, examine_content, content, name=uploaded_name(name, unnamed=_UNNAMED), companion=companion, gains=gains
     )
 
 

@@ -24,7 +24,8 @@ def _cache_folder(chosen: str) -> Path:
     change in one file would leave its callers with stale machine code.
     """
     digest = hashlib.sha256()
-    for source in sorted((*_HERE.glob("control/*.py"), *_HERE.glob("models/*.py"), Path(__file__))):
+    replicas = _HERE.parent.glob("autopilots/*/replica/*.py")
+    for source in sorted((*_HERE.glob("control/*.py"), *_HERE.glob("models/*.py"), *replicas, Path(__file__))):
         digest.update(source.read_bytes())
     own = _HERE / "__pycache__" if os.access(_HERE, os.W_OK) else Path.home() / ".cache" / "gainline"
     return Path(chosen or own) / f"kernels-{digest.hexdigest()[:16]}"

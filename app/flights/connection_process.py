@@ -23,6 +23,7 @@ from app.flights.flight_loop import (
     hold_vehicle_lock,
     internal_error,
 )
+from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
 from app.flights.process_messages import (
     CommandForwarded,
     ConnectionOpened,
@@ -36,8 +37,7 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
-from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
-from app.live.messages import SILENT_AFTER_S, FlightPhase, Telemetry, UnreadyReason, VehicleStatus
+from app.live.messages import SILENT_AFTER_S, UnreadyReason, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
     Condition,
@@ -105,7 +105,7 @@ class VehicleProcess(FlightLoop):
 
     def __init__(self, line: WorkerPipe, call: ConnectionRequest) -> None:
         """Connect to the vehicle. Raises VehicleError when it does not answer."""
-        super().__init__(line, call.clock)
+        super().__init__(line, call.clock, line.send_if_ready)
         self._call = call
         self._speed = float(call.vehicle.options.get("clock_speed", 1.0))
         self._is_open = self._may_interrupt = False
@@ -382,9 +382,6 @@ class VehicleProcess(FlightLoop):
             self._take_off_by_s = cleared.by_s
             self._require_in_time()
             return super()._take_off(vehicle, request, cleared)
-
-    def _publish(self, message: Telemetry | FlightPhase) -> None:
-        (self._line.send if isinstance(message, FlightPhase) else self._line.send_if_ready)(message)
 
     def _should_stop(self) -> StopRequest | None:
         self._require_in_time()

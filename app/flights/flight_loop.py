@@ -33,7 +33,7 @@ from app.flights.process_messages import (
     ToVehicleProcess,
     VehicleCommand,
 )
-from app.live.messages import FlightPhase, Phase, Telemetry
+from app.live.messages import FlightPhase, Telemetry
 from app.processes import ignore_stop_signals
 from app.processes.locks import LockedError, exclusive
 from app.vehicles.base import (
@@ -108,9 +108,11 @@ class WorkerPipe:
 class FlightLoop(ABC):
     """Carries out flights, one after another, for the worker at the other end of the pipe."""
 
-    def __init__(self, line: WorkerPipe, clock: Clock) -> None:
+    def __init__(self, line: WorkerPipe, clock: Clock, show: Callable[[Telemetry], None]) -> None:
+        """`show` sends telemetry."""
         self._line = line
         self._clock = clock
+        self._show = show
         self._trial_id: int | None = None
         self._stop: StopRequest | None = None
         self._is_worker_gone = False
@@ -123,10 +125,6 @@ class FlightLoop(ABC):
     @abstractmethod
     def _next(self) -> ToVehicleProcess:
         """Wait for the worker's next message. Raises PipeClosedError."""
-
-    @abstractmethod
-    def _publish(self, message: Telemetry | FlightPhase) -> None:
-        """Send telemetry and phases of the flight."""
 
     @abstractmethod
     def _vehicle_for(self, request: FlightRequest) -> AbstractContextManager[Vehicle]:
@@ -168,12 +166,12 @@ class FlightLoop(ABC):
         return answer if isinstance(answer, TakeOffCommand) else None
 
     def _take_off(self, vehicle: Vehicle, request: FlightRequest, _cleared: TakeOffCommand) -> FlightRecord:
-        monitor = FlightMonitor(request, self._publish, self._clock)
-        monitor.phase("flying")
+        monitor = FlightMonitor(request, self._show, self._clock)
+        self._line.send(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="flying"))
         record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=self._should_stop)
         monitor.flush()
         if record.has_flown:
-            monitor.phase("landed")
+            self._line.send(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="landed"))
         return record
 
     def _should_stop(self) -> StopRequest | None:
@@ -196,16 +194,13 @@ class SimulationLoop(FlightLoop):
     """Opens a simulation for each flight."""
 
     def __init__(self, line: WorkerPipe, data_dir: Path, clock: Clock) -> None:
-        super().__init__(line, clock)
+        super().__init__(line, clock, line.send)
         self._data_dir = data_dir
 
     def _next(self) -> ToVehicleProcess:
         message = self._line.receive(timeout_s=None)
         assert message is not None
         return message
-
-    def _publish(self, message: Telemetry | FlightPhase) -> None:
-        self._line.send(message)
 
     @contextmanager
     def _vehicle_for(self, request: FlightRequest) -> Iterator[Vehicle]:
@@ -282,24 +277,19 @@ class FlightMonitor:
     from its full-rate record.
     """
 
-    def __init__(
-        self, request: FlightRequest, publish: Callable[[Telemetry | FlightPhase], None], clock: Clock
-    ) -> None:
+    def __init__(self, request: FlightRequest, show: Callable[[Telemetry], None], clock: Clock) -> None:
         self._campaign_id = request.campaign_id
         self._trial_id = request.trial_id
         self._experiment = request.configured_experiment
         self._columns: list[str] = []
         self._scored_from_s = self._experiment.scored_from_s
         self._scored_until_s = float(self._experiment.grid_s[-1])
-        self._publish = publish
+        self._show = show
         self._clock = clock
         self._rows: list[list[float]] = []
         self._due_s = 0.0
         self._last: tuple[float, float] | None = None
         self._integral = 0.0
-
-    def phase(self, phase: Phase) -> None:
-        self._publish(FlightPhase(campaign_id=self._campaign_id, trial_id=self._trial_id, phase=phase))
 
     def sample(self, sample: Sample) -> None:
         output = self._experiment.output
@@ -320,7 +310,7 @@ class FlightMonitor:
         """Publish the collected samples."""
         if self._rows:
             rows, self._rows = self._rows, []
-            self._publish(
+            self._show(
                 Telemetry(
                     campaign_id=self._campaign_id,
                     trial_id=self._trial_id,

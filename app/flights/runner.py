@@ -20,7 +20,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.session import RETRY_S, Database, retry_until_stored
 from app.flights import flight_rows
 from app.flights.abort import AbortFlag, AbortRegistry
-from app.flights.flight_process import FlightProcess, FlightProcessPool
+from app.flights.flight_process import FlightProcess, FlightProcessPool, VehicleConnection
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
     FlightFailure,
@@ -31,8 +31,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
-from app.flights.vehicle_connection import VehicleConnection
-from app.live.messages import FlightPhase, Phase, Telemetry
+from app.live.messages import FlightPhase, Phase
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind
@@ -150,10 +149,8 @@ class FlightRunner:
         try:
             self._phase(request, "staging")
             flag.add_listener(lambda stop: backend.cancel_flight(request.trial_id, stop))
-            for message in backend.fly(request):
+            for message in backend.fly(request, self._publish):
                 match message:
-                    case Telemetry() | FlightPhase():
-                        self._publish(message)
                     case GainsStaged(read_back):
                         ended = self._staged(request, flag, backend, read_back)
                     case FlightLanded(record):

@@ -1,16 +1,37 @@
-"""Distribution of events to the open event streams of the web process, with the present state for streams that join
-late: telemetry so far of each running flight, and the vehicles' status. For one event loop only.
+"""Live part of the web process: distribution of the outbox, in order and once, and of the worker's telemetry to the
+open event streams, with the present state for streams that join late: telemetry so far of each running flight, and the
+vehicles' status. For one event loop only.
 """
 
 import asyncio
+import threading
 import time
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, replace
-from typing import Final
+from pathlib import Path
+from typing import Final, Literal, TypeVar
 
-from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleLinkState, VehicleStatus, encode
+import structlog
+from sqlalchemy.exc import DBAPIError
+
+from app.common.errors import StorageError
+from app.db.outbox import DatabaseWatch, events_after, latest_event_id
+from app.db.session import Database
+from app.live.link import LiveClient
+from app.live.messages import (
+    FlightPhase,
+    FromWorker,
+    PublishedMessage,
+    Telemetry,
+    VehicleLinkState,
+    VehicleStatus,
+    encode,
+    live_address,
+)
+
+_log = structlog.get_logger(__name__)
 
 _OVER = frozenset({"landed", "ended"})
 
@@ -106,7 +127,7 @@ class VehicleReport:
     status: VehicleStatus | None = None
 
 
-Live = PublishedMessage | LinkState
+LiveItem = PublishedMessage | LinkState
 
 
 class Subscription:
@@ -114,11 +135,11 @@ class Subscription:
 
     def __init__(self) -> None:
         self._changes: deque[Change] = deque()
-        self._live: deque[Live] = deque(maxlen=WAITING_TELEMETRY)
+        self._live: deque[LiveItem] = deque(maxlen=WAITING_TELEMETRY)
         self._ready = asyncio.Event()
         self._open = True
 
-    def push(self, item: Change | Live) -> None:
+    def push(self, item: Change | LiveItem) -> None:
         if isinstance(item, Change):
             self._changes.append(item)
             if len(self._changes) > WAITING_CHANGES:
@@ -132,7 +153,7 @@ class Subscription:
         self._open = False
         self._ready.set()
 
-    async def __aiter__(self) -> AsyncIterator[Change | Live]:
+    async def __aiter__(self) -> AsyncIterator[Change | LiveItem]:
         while self._open:
             if self._changes:
                 yield self._changes.popleft()
@@ -182,7 +203,7 @@ class Hub:
         """Status of the vehicles whose link is in that state."""
         return self._memory.vehicles(state)
 
-    def publish(self, item: Change | Live) -> None:
+    def publish(self, item: Change | LiveItem) -> None:
         match item:
             case Telemetry() | FlightPhase() | VehicleStatus():
                 self._memory.take(item)
@@ -205,3 +226,128 @@ class Hub:
         self._open = False
         for subscription in self._subscriptions:
             subscription.end()
+
+
+BATCH: Final = 500
+PAUSE_AFTER_TROUBLE_S: Final = 1.0
+LOOK_ANYWAY_S: Final = 5.0
+
+
+def changes_after(database: Database, event_id: int) -> Iterator[Change]:
+    """All changes after that event up to now, read in short transactions."""
+    while True:
+        with database.read() as session:
+            batch = [
+                Change(id=row.id, topic=row.topic, entity_id=row.entity_id, campaign_id=row.campaign_id)
+                for row in events_after(session, event_id, limit=BATCH)
+            ]
+        yield from batch
+        if len(batch) < BATCH:
+            return
+        event_id = batch[-1].id
+
+
+class OutboxTail:
+    """A thread that calls `publish(change)` for every event committed after `start`."""
+
+    def __init__(self, database: Database, publish: Callable[[Change], None]) -> None:
+        self._database = database
+        self._publish = publish
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="outbox tail", daemon=True)
+
+    def start(self) -> None:
+        """Note the present end of the outbox, and start the thread."""
+        with self._database.read() as session:
+            self._last = latest_event_id(session)
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._follow()
+            except (StorageError, DBAPIError) as error:
+                _log.error("the outbox cannot be read", why=str(error))
+                self._stop.wait(PAUSE_AFTER_TROUBLE_S)
+
+    def _follow(self) -> None:
+        with DatabaseWatch(self._database.file) as watch:
+            while not self._stop.is_set():
+                for change in changes_after(self._database, self._last):
+                    self._publish(change)
+                    self._last = change.id
+                watch.wait(self._stop, LOOK_ANYWAY_S)
+
+
+T = TypeVar("T")
+BEAT_S: Final = 3.0
+"""Interval of a message on every stream, so that a client detects a dead connection by longer silence."""
+
+
+class Live:
+    """The hub of the event streams, and the connection to the worker."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self.hub = Hub()
+        self.client = LiveClient(
+            live_address(data_dir),
+            on_message=self._on_message,
+            on_link=lambda up: self.hub.publish(LinkState(worker=up)),
+        )
+
+    @property
+    def worker_running(self) -> bool:
+        return self.client.connected
+
+    @property
+    def worker(self) -> Literal["running", "not answering", "absent"]:
+        if not self.client.connected:
+            return "absent"
+        return "running" if self.client.answers else "not answering"
+
+    def report(self, vehicle_id: int) -> VehicleReport:
+        """What is known of a vehicle now; may be called from any thread."""
+        return VehicleReport(worker=self.client.answers, status=self.hub.vehicle(vehicle_id))
+
+    async def beat(self) -> None:
+        """Publish periodically whether the worker is there, until cancelled."""
+        while True:
+            await asyncio.sleep(BEAT_S)
+            self.hub.publish(LinkState(worker=self.client.answers))
+
+    def _on_message(self, message: FromWorker) -> None:
+        if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
+            self.hub.publish(message)
+
+
+@asynccontextmanager
+async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
+    """Run the live link from the start to the end of the web process."""
+    live = Live(data_dir)
+    tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
+    await asyncio.to_thread(tail.start)
+    running = [asyncio.create_task(work) for work in (live.client.run(), live.client.watch(), live.beat())]
+    try:
+        yield live
+    finally:
+        live.hub.close()
+        for task in running:
+            task.cancel()
+        for task in running:
+            with suppress(asyncio.CancelledError):
+                await task
+        await asyncio.to_thread(tail.stop)
+
+
+def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[T], None]) -> Callable[[T], None]:
+    """Wrap a call so that it may be made from any thread; calls after the loop has ended are dropped."""
+
+    def later(item: T) -> None:
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(call, item)
+
+    return later

@@ -1,36 +1,35 @@
-"""Live part of the web process: publishes the outbox, in order and once, and the worker's telemetry to the event
-streams.
+"""The live link between worker and web process, both ends: the worker listens, publishes, and receives aborts and
+commands, in its own thread; the web process stays connected while there is a worker, and sends it what cannot wait for
+the database.
 
-It stays connected while there is a worker, and sends it what cannot wait for the database.
+Neither direction waits for storage or for a flight: an abort is forwarded from the socket's thread at once, and a
+client that reads too slowly loses telemetry instead of delaying the flight.
 """
 
 import asyncio
 import itertools
+import socket
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
 from pathlib import Path
-from typing import Final, Literal, TypeVar
+from typing import Final, Self, TypeVar
 
 import structlog
-from sqlalchemy.exc import DBAPIError
 
-from app.common.errors import StorageError
 from app.core.errors import GainlineError, InputError
-from app.db.outbox import DatabaseWatch, events_after, latest_event_id
-from app.db.session import Database
-from app.live.hub import Change, Hub, LinkState, VehicleReport
 from app.live.messages import (
     MAX_LINE_BYTES,
     Abort,
     AbortAnswer,
     Answer,
-    FlightPhase,
     FromWorker,
     Message,
     Ping,
     Pong,
+    PublishedMessage,
     Telemetry,
     ToWorker,
     VehicleCommandKind,
@@ -40,9 +39,19 @@ from app.live.messages import (
     WorkerHello,
     decode,
     encode,
-    live_address,
 )
 
+SLOW_CLIENT_BYTES: Final = 256 * 1024
+"""A client with more unread bytes gets neither telemetry nor vehicle status until it has caught up."""
+STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
+"""A client with more unread bytes is disconnected; it reconnects and reads the database."""
+CONFIRMATION_S: Final = 0.25
+"""How long after a command's deadline to wait for the answer that it was forwarded in time."""
+LATE: Final = "The command reached the worker too late and was not executed: use the vehicle's own remote control now."
+UNCONFIRMED: Final = (
+    "The process that has the vehicle's link did not answer, and will not execute the command later: use the "
+    "vehicle's own remote control now."
+)
 FIRST_PAUSE_S: Final = 0.05
 LONGEST_PAUSE_S: Final = 0.5
 ANSWER_TIMEOUT_S: Final = 2.0
@@ -52,6 +61,136 @@ PING_EVERY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
 A = TypeVar("A", AbortAnswer, VehicleOrderAnswer, Pong)
+
+
+class LiveServer:
+    """Listens at `path` between enter and exit.
+
+    `abort(trial_id, reason)` is called on the socket's thread and returns whether that trial is flying.
+    `order(vehicle_id, order, reason, by_s)` returns a future with why the command did not reach the vehicle, or "" if
+    it did. `hello()` describes the worker to a new client. All must return at once. A request that is handled after its
+    deadline, because this process was suspended, is not carried out.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        abort: Callable[[int, str], bool],
+        order: Callable[[int, VehicleCommandKind, str, float], Future[str]],
+        hello: Callable[[], WorkerHello],
+    ) -> None:
+        self._path = path
+        self._abort = abort
+        self._order = order
+        self._hello = hello
+        self._writers: set[asyncio.StreamWriter] = set()
+        self._orders: set[asyncio.Task[None]] = set()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="live", daemon=True)
+
+    def __enter__(self) -> Self:
+        listener = _listen(self._path)
+        self._thread.start()
+        asyncio.run_coroutine_threadsafe(self._open(listener), self._loop).result()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+        self._path.unlink(missing_ok=True)
+
+    def publish(self, message: PublishedMessage) -> None:
+        """Send to every client, without blocking. May be called from any thread."""
+        self._loop.call_soon_threadsafe(self._send_all, message)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+
+    async def _open(self, listener: socket.socket) -> None:
+        self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=MAX_LINE_BYTES)
+
+    async def _close(self) -> None:
+        self._server.close()
+        for writer in tuple(self._writers):
+            writer.close()
+        await asyncio.sleep(0)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._writers.add(writer)
+        try:
+            writer.write(encode(self._hello()))
+            while line := await reader.readline():
+                self._answer(line, writer)
+        except (ConnectionError, InputError, ValueError) as error:
+            _log.warning("live client dropped", why=str(error))
+        finally:
+            self._writers.discard(writer)
+            writer.close()
+
+    def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
+        answer: Message
+        match decode(line):
+            case Abort(request=request, trial_id=trial_id, reason=reason, by_s=by_s):
+                accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
+                answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
+                _log.info("abort requested", trial_id=trial_id, reason=reason, accepted=accepted)
+            case VehicleOrder() as ordered:
+                task = self._loop.create_task(self._pass_on(ordered, writer))
+                self._orders.add(task)
+                task.add_done_callback(self._orders.discard)
+                return
+            case Ping(request=request):
+                answer = Pong(request=request)
+            case other:
+                raise InputError(
+                    f"A client sent {other.type!r}, which only the worker may send.",
+                    hint="Connect to the worker's socket with Gainline only.",
+                )
+        writer.write(encode(answer))
+
+    async def _pass_on(self, ordered: VehicleOrder, writer: asyncio.StreamWriter) -> None:
+        """Forward a command and send the answer: when the vehicle's process answers, or shortly after the deadline if
+        it does not."""
+        problem = LATE
+        if _is_in_time(ordered.by_s):
+            forwarded = asyncio.wrap_future(
+                self._order(ordered.vehicle_id, ordered.order, ordered.reason, ordered.by_s)
+            )
+            await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
+            problem = forwarded.result() if forwarded.done() else UNCONFIRMED
+        vehicle_id, accepted = ordered.vehicle_id, not problem
+        _log.info("vehicle command", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
+        answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)
+        writer.write(encode(answer))
+
+    def _send_all(self, message: FromWorker) -> None:
+        line = encode(message)
+        for writer in tuple(self._writers):
+            unread = writer.transport.get_write_buffer_size()
+            if unread > STUCK_CLIENT_BYTES:
+                writer.transport.abort()
+            elif unread <= SLOW_CLIENT_BYTES or not isinstance(message, Telemetry | VehicleStatus):
+                writer.write(line)
+
+
+def _is_in_time(by_s: float) -> bool:
+    return time.monotonic() <= by_s
+
+
+def _listen(path: Path) -> socket.socket:
+    """A bound socket that only this user may open; no client can connect before it listens, which is after the chmod.
+
+    The caller holds the worker's lock, so an existing file belongs to a dead worker.
+    """
+    path.unlink(missing_ok=True)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    listener.bind(str(path))
+    path.chmod(0o600)
+    return listener
 
 
 class LinkDownError(GainlineError):
@@ -189,128 +328,3 @@ def _link_down(why: str) -> LinkDownError:
         hint="If a vehicle is in the air, use its own remote control now. The server restarts its own worker "
         "within seconds. If the worker runs separately, start it again with `gainline worker`.",
     )
-
-
-BATCH: Final = 500
-PAUSE_AFTER_TROUBLE_S: Final = 1.0
-LOOK_ANYWAY_S: Final = 5.0
-
-
-def changes_after(database: Database, event_id: int) -> Iterator[Change]:
-    """All changes after that event up to now, read in short transactions."""
-    while True:
-        with database.read() as session:
-            batch = [
-                Change(id=row.id, topic=row.topic, entity_id=row.entity_id, campaign_id=row.campaign_id)
-                for row in events_after(session, event_id, limit=BATCH)
-            ]
-        yield from batch
-        if len(batch) < BATCH:
-            return
-        event_id = batch[-1].id
-
-
-class OutboxTail:
-    """A thread that calls `publish(change)` for every event committed after `start`."""
-
-    def __init__(self, database: Database, publish: Callable[[Change], None]) -> None:
-        self._database = database
-        self._publish = publish
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="outbox tail", daemon=True)
-
-    def start(self) -> None:
-        """Note the present end of the outbox, and start the thread."""
-        with self._database.read() as session:
-            self._last = latest_event_id(session)
-        self._thread.start()
-
-    def stop(self) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                self._follow()
-            except (StorageError, DBAPIError) as error:
-                _log.error("the outbox cannot be read", why=str(error))
-                self._stop.wait(PAUSE_AFTER_TROUBLE_S)
-
-    def _follow(self) -> None:
-        with DatabaseWatch(self._database.file) as watch:
-            while not self._stop.is_set():
-                for change in changes_after(self._database, self._last):
-                    self._publish(change)
-                    self._last = change.id
-                watch.wait(self._stop, LOOK_ANYWAY_S)
-
-
-T = TypeVar("T")
-BEAT_S: Final = 3.0
-"""Interval of a message on every stream, so that a client detects a dead connection by longer silence."""
-
-
-class Live:
-    """The hub of the event streams, and the connection to the worker."""
-
-    def __init__(self, data_dir: Path) -> None:
-        self.hub = Hub()
-        self.client = LiveClient(
-            live_address(data_dir),
-            on_message=self._on_message,
-            on_link=lambda up: self.hub.publish(LinkState(worker=up)),
-        )
-
-    @property
-    def worker_running(self) -> bool:
-        return self.client.connected
-
-    @property
-    def worker(self) -> Literal["running", "not answering", "absent"]:
-        if not self.client.connected:
-            return "absent"
-        return "running" if self.client.answers else "not answering"
-
-    def report(self, vehicle_id: int) -> VehicleReport:
-        """What is known of a vehicle now; may be called from any thread."""
-        return VehicleReport(worker=self.client.answers, status=self.hub.vehicle(vehicle_id))
-
-    async def beat(self) -> None:
-        """Publish periodically whether the worker is there, until cancelled."""
-        while True:
-            await asyncio.sleep(BEAT_S)
-            self.hub.publish(LinkState(worker=self.client.answers))
-
-    def _on_message(self, message: FromWorker) -> None:
-        if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
-            self.hub.publish(message)
-
-
-@asynccontextmanager
-async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
-    """Run the live link from the start to the end of the web process."""
-    live = Live(data_dir)
-    tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
-    await asyncio.to_thread(tail.start)
-    running = [asyncio.create_task(work) for work in (live.client.run(), live.client.watch(), live.beat())]
-    try:
-        yield live
-    finally:
-        live.hub.close()
-        for task in running:
-            task.cancel()
-        for task in running:
-            with suppress(asyncio.CancelledError):
-                await task
-        await asyncio.to_thread(tail.stop)
-
-
-def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[T], None]) -> Callable[[T], None]:
-    """Wrap a call so that it may be made from any thread; calls after the loop has ended are dropped."""
-
-    def later(item: T) -> None:
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(call, item)
-
-    return later

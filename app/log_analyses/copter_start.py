@@ -7,12 +7,11 @@ from typing import Final
 
 from app.autopilots.experiments import EXPERIMENTS
 from app.core.analysis.analysis import Analysis
-from app.core.control.ardupilot_parameters import in_older_names
 from app.core.definition import LogEvidence
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.copter_steps import CopterSteps, vector_of
 
-_EXPERIMENTS: Final[Mapping[str, CopterSteps]] = MappingProxyType(
+STEPS: Final[Mapping[str, CopterSteps]] = MappingProxyType(
     {each.autopilot: each for each in EXPERIMENTS.values() if isinstance(each, CopterSteps)}
 )
 
@@ -34,9 +33,9 @@ def start_of(analysis: Analysis, file_name: str) -> CopterStart:
             hint=analysis.answer,
             problems=(Problem("file", "gives no better gains to begin with"),),
         )
-    experiment = _EXPERIMENTS[analysis.loop.texts.autopilot]
+    experiment = STEPS[analysis.loop.texts.autopilot]
     parameters = analysis.loop.firmware_parameters
-    proposed = dict(in_older_names(*each) for each in analysis.proposed.gains.items())
+    proposed = experiment.loop_parameters(analysis.proposed.gains)
     space = experiment.space
     mean, deviation = (vector_of(each).tolist() for each in (analysis.estimate.mean, analysis.estimate.deviation))
     return CopterStart(

@@ -11,6 +11,7 @@ from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.formatting import format_gains, percent
 from app.core.records.trajectory import Samples
 from app.figures.panels import Line, Panel, Plot
+from app.log_analyses.copter_start import STEPS
 from app.log_analyses.schemas import (
     EstimatedValue,
     EstimatedVehicle,
@@ -47,6 +48,8 @@ class AnalysedManoeuvres:
             autopilot=analysis.loop.texts.autopilot,
             answer=analysis.answer,
             proposes=analysis.proposed is not None,
+            starts_campaign=analysis.proposed is not None,
+            experiment=STEPS[analysis.loop.texts.autopilot].name,
             flight=_flight(analysis),
             vehicle=self._vehicle(),
             gains=_table(analysis),

@@ -1,7 +1,7 @@
 """What a log tells about the altitude control of its vehicle: for a person and, in numbers, for scripts."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -141,9 +141,14 @@ class LogAnswer(Schema):
     """The result of a log analysis without its figure."""
 
     file_name: str
-    autopilot: Literal["ArduCopter", "PX4", "Paparazzi"]
+    autopilot: Annotated[str, Field(description="its title")]
     answer: str
     proposes: Annotated[bool, Field(description="whether gains are proposed; if not, `answer` says why")]
+    starts_campaign: Annotated[bool, Field(description="whether a campaign can start from this log")]
+    experiment: Annotated[
+        str | None,
+        Field(description="of this campaign, for a vehicle that flies it; null: the vehicle is flown elsewhere"),
+    ]
     flight: Annotated[Sequence[str], Field(description="how the altitude was controlled")]
     vehicle: Annotated[Sequence[str], Field(description="the fitted vehicle")]
     gains: GainsTable

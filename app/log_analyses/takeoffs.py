@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
+from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
@@ -23,6 +24,7 @@ from app.log_analyses.schemas import (
     TakeoffNumbers,
 )
 
+_AUTOPILOT: Final = next(each for each in AUTOPILOTS.values() if isinstance(each.experiments[0], Experiment))
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""
 _SHOWN_S: Final = 8.0
@@ -62,9 +64,11 @@ class AnalysedTakeoffs:
         analysis = self.analysis
         return LogAnswer(
             file_name=self.file_name,
-            autopilot="Paparazzi",
+            autopilot=_AUTOPILOT.title,
             answer=analysis.answer,
             proposes=analysis.proposed is not None,
+            starts_campaign=True,
+            experiment=None,
             flight=_flight(analysis),
             vehicle=_vehicle(analysis),
             gains=_table(analysis),

@@ -1,15 +1,16 @@
 """What kind of file it is, from its first bytes: for import, analysis, the check of a controller, the command line."""
 
+import re
 from collections.abc import Callable
 from enum import StrEnum
 from typing import Final
 
 from app.logs.dataflash import is_dataflash
-from app.logs.paparazzi import is_paparazzi
 from app.logs.tlog import is_tlog
 from app.logs.ulog import is_ulog
 
 HEAD_BYTES: Final = 4096
+_GROUND_LOG_LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
 
 
 class Format(StrEnum):
@@ -18,10 +19,15 @@ class Format(StrEnum):
     TLOG = ".tlog"
     DATAFLASH = ".bin"
     ULOG = ".ulg"
-    PAPARAZZI = ".data"
+    GROUND_LOG = ".data"
     GZIP = ".gz"
     ZIP = ".zip"
     DATAFLASH_TEXT = ".log"
+
+
+def is_ground_log(head: bytes) -> bool:
+    """Whether a file with this head has lines of time, aircraft, name of a message and its fields (.data)."""
+    return bool(_GROUND_LOG_LINE.match(head))
 
 
 def _begins_with(first: bytes) -> Callable[[bytes], bool]:
@@ -32,7 +38,7 @@ _KINDS: Final[tuple[tuple[Format, Callable[[bytes], bool]], ...]] = (
     (Format.TLOG, is_tlog),
     (Format.DATAFLASH, is_dataflash),
     (Format.ULOG, is_ulog),
-    (Format.PAPARAZZI, is_paparazzi),
+    (Format.GROUND_LOG, is_ground_log),
     (Format.GZIP, _begins_with(b"\x1f\x8b")),
     (Format.ZIP, _begins_with(b"PK\x03\x04")),
     (Format.DATAFLASH_TEXT, _begins_with(b"FMT, ")),

@@ -39,8 +39,8 @@ from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
 from app.jobs.runner import JobRunner, recover
+from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
-from app.live.server import LiveServer
 from app.processes.locks import LockedError, exclusive
 from app.processes.pool import ComputePool
 from app.reproductions.service import REPRODUCTION_JOB

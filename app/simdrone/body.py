@@ -8,7 +8,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_STEPS, Body, VerticalCommand
-from app.core.control.paparazzi import Z_SUM_ERR
+from app.core.control.vertical_guidance import Z_SUM_ERR
 from app.core.errors import InputError, Problem
 from app.vehicles.base import OptionValue, VehicleError
 from app.vehicles.jsbsim import JSBSIM, JsbsimFlight

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from app.core.control.paparazzi import RATE_HZ, STEP_S
+from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.errors import Problem
 from app.core.formatting import percent
 from app.core.models.vertical import GRAVITY_M_S2
@@ -69,7 +69,7 @@ class JsbsimFlight:
     """One flight in JSBSim, a `Simulation` of `app.vehicles.simulated`.
 
     `options` are the complete options of the kind. Gusts and sensor noise depend on `seed` alone and repeat after
-    `MAX_STEPS`. `autopilot` is the loop's memory, which begins with the state of app.core.control.paparazzi.
+    `MAX_STEPS`. `autopilot` is the loop's memory, which begins with the state of app.core.control.vertical_guidance.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:

@@ -10,7 +10,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from app.core.clock import REAL_TIME, Clock
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ALT,
     CLIMB,
     INT32_MAX,

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.paparazzi import RATE_HZ, STEP_S
+from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.errors import Problem
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS
 from app.core.formatting import percent
@@ -33,7 +33,7 @@ class TwinFlight:
 
     `options` are the complete options of the kind. The scatter between flights depends on `seed` alone; the gusts
     repeat after `MAX_STEPS`. `autopilot` is the loop's memory, which begins with the state of
-    app.core.control.paparazzi.
+    app.core.control.vertical_guidance.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:

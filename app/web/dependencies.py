@@ -24,7 +24,7 @@ from app.common.settings import Settings
 from app.db.idempotency import carry_out_once
 from app.db.session import Database
 from app.figures.theme import ThemeName
-from app.live.link import Live as LiveLink
+from app.live.hub import Live as LiveLink
 from app.web.origin import caller_of
 
 M = TypeVar("M", bound=BaseModel)

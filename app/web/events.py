@@ -12,9 +12,7 @@ from app import __version__
 from app.db.outbox import holds_everything_after, latest_event_before, latest_event_id
 from app.db.session import Database
 from app.db.types import utc_now
-from app.live.hub import Change, LinkState
-from app.live.hub import Live as LiveItem
-from app.live.link import changes_after
+from app.live.hub import Change, LinkState, LiveItem, changes_after
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.web.dependencies import CurrentDatabase, Live
 

@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.replica.parameters import FIRMWARE_NAMES, STEP_S, parameters_from
 from app.autopilots.experiments import get_experiment
-from app.core.control import px4_parameters
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, STEP_S, parameters_from
+from app.autopilots.px4.replica import parameters as px4_parameters
 from app.core.experiments.copter_steps import CopterSteps
 from app.core.models.set_points import SetPoints
 from app.core.records.trajectory import Samples, Trajectory

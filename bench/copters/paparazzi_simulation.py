@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ALT,
     FULL_THRUST,
     LEVEL,

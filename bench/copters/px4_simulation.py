@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.loop import SLOW_HZ, Px4Loop
+from app.autopilots.px4.replica import vertical as loop
+from app.autopilots.px4.replica.parameters import STEP_S, Packed, Parameters, low_pass_gain
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
-from app.core.control import px4 as loop
-from app.core.control.px4_parameters import STEP_S, Packed, Parameters, low_pass_gain
 from app.core.kernels import kernel
 from app.core.models.copter import filtered
 from app.core.records.trajectory import Samples

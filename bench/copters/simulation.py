@@ -11,10 +11,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.parameters import DT, STEP_S, THROTTLE_GAIN, Packed, Parameters
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import DT, STEP_S, THROTTLE_GAIN, Packed, Parameters
 from app.core.kernels import kernel
 from app.core.models.copter import GRAVITY_M_S2, Copter, accelerometer_filter
 from app.core.records.trajectory import Samples

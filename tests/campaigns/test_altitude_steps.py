@@ -136,7 +136,7 @@ def test_the_error_so_far_begins_with_the_first_step_and_ends_at_the_error(
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     task = lift_off(database)
     heard: list[Telemetry] = []
-    monitor = FlightMonitor(task, lambda said: heard.append(said) if isinstance(said, Telemetry) else None, REAL_TIME)
+    monitor = FlightMonitor(task, heard.append, REAL_TIME)
     land(database, task, record_of(task, monitor))
     monitor.flush()
     assert [said.error_so_far for said in heard if said.time_s <= 10.0] == [None] * len(

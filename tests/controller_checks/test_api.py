@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
 from app.cli.commands import app
-from app.core.control.paparazzi import OUTPUTS
+from app.core.control.vertical_guidance import OUTPUTS
 from app.db.models import ControllerCheckRow
 from app.db.session import Database
 from tests.builders import get, problems_of

@@ -17,7 +17,7 @@ print(run["altitude_m"].tobytes().hex()[-4000:])
 """
 
 SMALL = """
-from app.core.control.ardupilot_shaping import square_root
+from app.autopilots.ardupilot.replica.shaping import square_root
 print(square_root(1.0, 2.0, 3.0, 0.01))
 """
 """A kernel that is compiled within a moment."""

@@ -17,8 +17,8 @@ from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
+from app.flights.flight_process import VehicleConnection, status_time
 from app.flights.process_messages import ConnectionOpened
-from app.flights.vehicle_connection import VehicleConnection, status_time
 from app.live.messages import VehicleStatus
 from app.main import create_app
 from app.vehicles.base import CheckItem, Identity

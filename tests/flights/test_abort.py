@@ -11,8 +11,8 @@ from sqlalchemy.pool import QueuePool
 from app.common.settings import Settings
 from app.db import session as session_module
 from app.db.session import Database
+from app.live.link import LiveServer
 from app.live.messages import WorkerHello, live_address
-from app.live.server import LiveServer
 from tests.builders import get
 from tests.waiting import eventually
 

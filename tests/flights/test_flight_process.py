@@ -15,7 +15,7 @@ from app.common.data_folder import vehicle_lock
 from app.flights.flight_loop import FlightMonitor
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
-from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
+from app.live.messages import MAX_LINE_BYTES, FlightPhase, PublishedMessage, Telemetry, encode
 from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
@@ -56,12 +56,17 @@ def flight_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FlightP
 def fly(
     flight_process: FlightProcess, asked: FlightRequest, on_said: Callable[[FlightMessage], None] = lambda _said: None
 ) -> list[FlightMessage]:
-    heard = []
-    for said in flight_process.fly(asked):
+    heard: list[FlightMessage] = []
+
+    def hear(said: FlightMessage | PublishedMessage) -> None:
+        assert isinstance(said, FlightMessage)
         heard.append(said)
+        on_said(said)
+
+    for said in flight_process.fly(asked, hear):
         if isinstance(said, GainsStaged):
             flight_process.take_off()
-        on_said(said)
+        hear(said)
     return heard
 
 
@@ -94,9 +99,7 @@ def test_a_flight_in_the_process_is_the_flight_in_this_one_and_its_telemetry_cov
 def test_a_flight_computed_at_once_is_sent_in_messages_that_the_live_link_takes() -> None:
     """Observed defect: a pitch flight at full speed came as one message, longer than a line of the link may be."""
     heard: list[Telemetry] = []
-    monitor = FlightMonitor(
-        flight_of(), lambda said: heard.append(said) if isinstance(said, Telemetry) else None, ManualClock()
-    )
+    monitor = FlightMonitor(flight_of(), heard.append, ManualClock())
     channels = {"altitude_m": 1.0 / 3.0, **{f"channel_{number}": 1.0 / 3.0 for number in range(10)}}
     sent = [Sample(number / 500.0, channels) for number in range(4000)]
     for sample in sent:
@@ -109,9 +112,7 @@ def test_a_flight_computed_at_once_is_sent_in_messages_that_the_live_link_takes(
 def test_a_reference_that_is_reported_later_begins_a_message_and_is_scored_from_then_on() -> None:
     heard: list[Telemetry] = []
     steps = replace(flight_of(), experiment="altitude-steps")
-    monitor = FlightMonitor(
-        steps, lambda said: heard.append(said) if isinstance(said, Telemetry) else None, ManualClock()
-    )
+    monitor = FlightMonitor(steps, heard.append, ManualClock())
     for number in range(4):
         known = {"reference_m": 2.0 + 0.1 * number} if number > 1 else {}
         monitor.sample(Sample(11.0 + number, {"altitude_m": 2.0, **known}))
@@ -141,7 +142,7 @@ def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(flight
 
 def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> None:
     heard = []
-    for said in flight_process.fly(flight_of()):
+    for said in flight_process.fly(flight_of(), lambda _shown: None):
         heard.append(said)
         flight_process.cancel_take_off()
     assert heard == [GainsStaged(GAINS)]
@@ -149,7 +150,7 @@ def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> No
 
 def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(flight_process: FlightProcess) -> None:
     heard = []
-    for said in flight_process.fly(flight_of(speed=1.0)):
+    for said in flight_process.fly(flight_of(speed=1.0), lambda _shown: None):
         heard.append(said)
         if isinstance(said, GainsStaged):
             flight_process.cancel_flight(1, StopRequest("not today"))

@@ -18,7 +18,14 @@ from app.db.session import Database
 from app.fleet.service import hold_gains
 from app.flights.abort import AbortRegistry
 from app.flights.flight_rows import REQUEST_TIMEOUT
-from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
+from app.flights.process_messages import (
+    FlightFailure,
+    FlightMessage,
+    FlightRequest,
+    GainsStaged,
+    Publish,
+    SafeGainsRestored,
+)
 from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
 from app.vehicles.end_texts import end_text
@@ -296,7 +303,7 @@ class Refusing:
     alive = True
     takes_its_safe_gains = True
 
-    def fly(self, request: FlightRequest) -> Iterator[FlightMessage]:
+    def fly(self, request: FlightRequest, _publish: Publish) -> Iterator[FlightMessage]:
         yield GainsStaged(dict(request.gains))
         if self.takes_its_safe_gains:
             yield SafeGainsRestored(dict(request.safe_gains))

@@ -20,8 +20,8 @@ from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.flight_commands import record_abort
 from app.flights.flight_rows import FlightOutcome
+from app.live.link import LiveServer
 from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
-from app.live.server import LiveServer
 from app.main import create_app
 from app.vehicles.base import FlightRecord
 from app.vehicles.end_texts import end_text, unstaged_text

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from app.flights import vehicle_connection as session_module
+from app.flights import flight_process as session_module
+from app.flights.flight_process import VehicleConnection
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleCommand
-from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import VehicleStatus
 from app.vehicles.base import Identity, LinkedVehicle
 from tests.waiting import Waits

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.db.outbox import DatabaseWatch
-from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live, LiveState
+from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, LiveItem, LiveState
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from tests.waiting import Waits
 
@@ -21,7 +21,7 @@ def telemetry(time_s: float) -> Telemetry:
 
 
 def test_a_slow_stream_gets_every_change_and_only_the_newest_telemetry() -> None:
-    async def scenario() -> list[Change | Live]:
+    async def scenario() -> list[Change | LiveItem]:
         hub = Hub()
         with hub.subscribe() as stream:
             for number in range(500):
@@ -36,14 +36,14 @@ def test_a_slow_stream_gets_every_change_and_only_the_newest_telemetry() -> None
 
 
 def test_two_streams_see_the_same() -> None:
-    async def collect(hub: Hub, items: list[Change | Live]) -> None:
+    async def collect(hub: Hub, items: list[Change | LiveItem]) -> None:
         with hub.subscribe() as stream:
             items.extend([item async for item in stream])
 
-    async def scenario() -> tuple[list[Change | Live], list[Change | Live]]:
+    async def scenario() -> tuple[list[Change | LiveItem], list[Change | LiveItem]]:
         hub = Hub()
-        first: list[Change | Live] = []
-        second: list[Change | Live] = []
+        first: list[Change | LiveItem] = []
+        second: list[Change | LiveItem] = []
         tasks = [asyncio.create_task(collect(hub, items)) for items in (first, second)]
         await asyncio.sleep(0)
         for item in (change(1), telemetry(0.1), LinkState(worker=False), change(2)):
@@ -87,7 +87,7 @@ def test_a_stream_that_joins_late_is_told_how_the_vehicles_are_while_there_is_a_
     def status(vehicle_id: int, altitude_m: float) -> VehicleStatus:
         return VehicleStatus(vehicle_id=vehicle_id, state="connected", at="", step="record", altitude_m=altitude_m)
 
-    async def first_heard(hub: Hub, count: int) -> list[Change | Live]:
+    async def first_heard(hub: Hub, count: int) -> list[Change | LiveItem]:
         with hub.subscribe() as stream:
             hub.publish(change(1))
             items = aiter(stream)

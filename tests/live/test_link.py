@@ -17,7 +17,8 @@ import pytest
 from app.core.errors import InputError
 from app.db.session import Database
 from app.live import link as client_module
-from app.live.link import LinkDownError, LiveClient, live_link
+from app.live.hub import live_link
+from app.live.link import SLOW_CLIENT_BYTES, LinkDownError, LiveClient, LiveServer
 from app.live.messages import (
     LONGEST_PATH_BYTES,
     Abort,
@@ -35,7 +36,6 @@ from app.live.messages import (
     encode,
     live_address,
 )
-from app.live.server import SLOW_CLIENT_BYTES, LiveServer
 from tests.waiting import Waits
 
 

@@ -34,8 +34,8 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
     assert numbers["vehicle"]["thrust_slope"]["mean"] == pytest.approx(1.0, abs=0.01)
     assert numbers["vehicle"]["assumed_hover_throttle"] == pytest.approx(0.39)
     assert numbers["proposed"]["error_m"] < 0.2 * numbers["assessments"][0]["error_m"]
-    assert found["autopilot"] == "ArduCopter"
-    assert found["proposes"]
+    assert (found["autopilot"], found["experiment"]) == ("ArduCopter", "altitude-steps-ardupilot")
+    assert (found["proposes"], found["starts_campaign"]) == (True, True)
     assert found["answer"].startswith("Mean deviation: 23.4 mm measured.")
     assert found["parameter_file"]["name"] == "steps.param"
     assert "PSC_POSZ_P,3\n" in found["parameter_file"]["content"]
@@ -88,6 +88,7 @@ def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -
     """The vehicle hovers at 0.40, and was told 0.35; P falls short of the hand rule's 8 because of the activity."""
     found = send(client, "flight.ulg", px4_log(simulated_px4())).json()
     assert (found["autopilot"], found["proposes"]) == ("PX4", True)
+    assert (found["experiment"], found["starts_campaign"]) == ("altitude-steps-px4", True)
     vehicle = found["numbers"]["vehicle"]
     assert vehicle["hover_throttle"]["mean"] == pytest.approx(0.40, abs=0.01)
     assert vehicle["assumed_hover_throttle"] == pytest.approx(0.35)
@@ -140,6 +141,7 @@ def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
 def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(client: TestClient) -> None:
     found = send(client, "flight.tlog", recorded("paparazzi_283_13_82.tlog")).json()
     assert (found["autopilot"], found["proposes"]) == ("Paparazzi", True)
+    assert (found["experiment"], found["starts_campaign"]) == (None, True)
     assert found["gains"]["columns"] == ["Gains", "kp", "ki", "kd", "Flown", "Predicted", "90 % interval", "Gate"]
     assert [row[0] for row in found["gains"]["rows"]] == ["As flown", "Proposed"]
     assert found["gains"]["rows"][0][:5] == ["As flown", "283", "13", "82", "0.330 m"]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.core.control import paparazzi as loop
+from app.core.control import vertical_guidance as loop
 
 HOVER_THROTTLE = 0.63
 GROUND_M = 0.1

@@ -3,9 +3,9 @@ import json
 
 import pytest
 
+from app.autopilots.ardupilot.replica.parameters import Parameters
+from app.autopilots.ardupilot.replica.replay import Hover, LoopTrace
 from app.autopilots.ardupilot.trace import COLUMNS, is_ardupilot_trace, read_ardupilot_trace
-from app.core.control.ardupilot_parameters import Parameters
-from app.core.control.ardupilot_replay import Hover, LoopTrace
 from app.core.errors import InputError
 
 HOVER = {"z_m": 6.0, "v_m_s": 0.1, "a_m_s2": -0.2, "throttle": 0.39}

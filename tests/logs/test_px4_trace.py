@@ -4,10 +4,10 @@ import json
 import numpy as np
 import pytest
 
+from app.autopilots.px4.replica.parameters import Parameters
+from app.autopilots.px4.replica.replay import LoopTrace
+from app.autopilots.px4.replica.vertical import INPUTS, OUTPUTS
 from app.autopilots.px4.trace import COLUMNS, is_px4_trace, read_px4_trace
-from app.core.control.px4 import INPUTS, OUTPUTS
-from app.core.control.px4_parameters import Parameters
-from app.core.control.px4_replay import LoopTrace
 from app.core.errors import InputError
 
 DESCRIPTION = {"what": "a hover", "parameters": {"MPC_Z_P": 1.5, "SIH_MASS": 1.0}}

@@ -8,8 +8,8 @@ from typing import Final, Literal
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega
 
-from app.core.control import px4_parameters
-from app.core.control.ardupilot_parameters import Parameters
+from app.autopilots.ardupilot.replica.parameters import Parameters
+from app.autopilots.px4.replica import parameters as px4_parameters
 from app.core.records.trajectory import Samples
 from bench.copters.px4_simulation import fly_reference
 from bench.copters.simulation import fly_targets

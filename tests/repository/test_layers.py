@@ -26,6 +26,26 @@ VIOLATIONS = {
         "Processes that",
     ),
     "an autopilot knows a vehicle": ("autopilots/__init__.py", "import app.vehicles.base", "Logs and figures"),
+    "a replica reads a log": (
+        "autopilots/px4/replica/vertical.py",
+        "import app.logs.ulog",
+        "Replicas of autopilots",
+    ),
+    "a replica reads a recording": (
+        "autopilots/px4/replica/vertical.py",
+        "import app.autopilots.recording",
+        "Replicas of autopilots",
+    ),
+    "a replica knows its log": (
+        "autopilots/px4/replica/vertical.py",
+        "import app.autopilots.px4.log",
+        "Replicas of autopilots",
+    ),
+    "a replica knows pymavlink": (
+        "autopilots/px4/replica/vertical.py",
+        "import pymavlink",
+        "Replicas of autopilots",
+    ),
     "a vehicle reads logs": ("vehicles/base.py", "import app.logs", "Logs and figures"),
     "a figure reads the database": ("figures/base.py", "import app.db.models", "Logs and figures"),
     "the simulated drone reads the database": ("simdrone/drone.py", "import app.db.models", "The simulated drone"),

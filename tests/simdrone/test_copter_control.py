@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from app.autopilots.ardupilot.replica import vertical as ardupilot
 from app.autopilots.ardupilot.simulated_control import ArduPilotController
+from app.autopilots.px4.replica import vertical as px4
 from app.autopilots.px4.simulated_control import Px4Controller
 from app.autopilots.simulated.copter import Copter
-from app.core.control import ardupilot, px4
 from tests.simdrone.copters import (
     ARM,
     ARMED,

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, throttle_command
-from app.core.control.paparazzi import RATE_HZ
+from app.core.control.vertical_guidance import RATE_HZ
 from app.core.errors import InputError
 from app.simdrone.body import new_body
 from app.simdrone.drone import CATCH_UP_S

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.simulated.body import VerticalCommand
-from app.core.control.paparazzi import ALT
+from app.core.control.vertical_guidance import ALT
 from app.simdrone.body import packed
 from app.vehicles.registry import check_options
 from app.vehicles.twin import TwinFlight

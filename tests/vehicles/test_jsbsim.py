@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from app.core.control.paparazzi import ALT
+from app.core.control.vertical_guidance import ALT
 from app.core.errors import InputError
 from app.core.records.trajectory import Trajectory
 from app.vehicles.base import OptionValue

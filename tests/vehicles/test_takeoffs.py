@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from app.core.control.paparazzi import ALT, LEVEL, Z_REF, measured, new_state, step
+from app.core.control.vertical_guidance import ALT, LEVEL, Z_REF, measured, new_state, step
 from app.core.errors import GainsError
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import FlightOptions, Vehicle

@@ -6,8 +6,8 @@ from concurrent.futures import Future
 from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
+from app.live.link import LiveServer
 from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello, live_address
-from app.live.server import LiveServer
 from tests.builders import get
 from tests.waiting import eventually
 

@@ -8,8 +8,8 @@ from typing import Final
 
 from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot, shaped_reference
+from app.autopilots.ardupilot.replica import parameters as ardupilot_parameters
 from app.core.analysis.flight import LoggedFlight
-from app.core.control import ardupilot_parameters
 from app.core.experiments.base import Experiment, Scatter
 from app.core.experiments.copter_steps import CopterSteps, copter_parameters
 from app.core.experiments.takeoff import CopterTakeoff, copter_gain

@@ -8,6 +8,16 @@ import numpy as np
 
 from app.autopilots.ardupilot.log import LOOP, history
 from app.autopilots.ardupilot.loop import SPACE, ArduPilotLoop
+from app.autopilots.ardupilot.replica.parameters import (
+    ACCELEROMETER_FILTER,
+    ACCELEROMETER_FILTER_HZ,
+    LOOP_NAMES,
+    LOOP_RATE,
+    LOOP_RATE_HZ,
+    LOOP_RATES_HZ,
+    in_newer_names,
+    parameters_from,
+)
 from app.autopilots.recording import LONGEST_INTERVAL_S, EventKind, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
     LARGEST_LEAN,
@@ -19,16 +29,6 @@ from app.autopilots.segments import (
 )
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
-from app.core.control.ardupilot_parameters import (
-    ACCELEROMETER_FILTER,
-    ACCELEROMETER_FILTER_HZ,
-    LOOP_NAMES,
-    LOOP_RATE,
-    LOOP_RATE_HZ,
-    LOOP_RATES_HZ,
-    in_newer_names,
-    parameters_from,
-)
 from app.core.records.trajectory import Samples
 
 _TUNING: Final = ("demanded_throttle", "thrust", "hover_throttle")

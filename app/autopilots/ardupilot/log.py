@@ -9,6 +9,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.autopilots.ardupilot.profile import ARDUPILOT
+from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.recording import (
     Event,
     EventKind,
@@ -19,7 +20,6 @@ from app.autopilots.recording import (
     columns_of,
     restarts,
 )
-from app.core.control.ardupilot_parameters import in_older_names
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import parameters_in, read_tables
 

@@ -7,10 +7,9 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
-from app.core.analysis.segment import Segment, Steps
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import (
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.copter import fly, step
+from app.autopilots.ardupilot.replica.parameters import (
     ACCELEROMETER_FILTER,
     FIRMWARE_NAMES,
     HOVER,
@@ -19,8 +18,9 @@ from app.core.control.ardupilot_parameters import (
     Parameters,
     in_newer_names,
 )
-from app.core.control.ardupilot_shaping import square_root
-from app.core.models.ardupilot_copter import fly, step
+from app.autopilots.ardupilot.replica.shaping import square_root
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
+from app.core.analysis.segment import Segment, Steps
 from app.core.models.copter import (
     DISTURBANCES,
     FLOWN,

@@ -4,15 +4,21 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-import numpy as np
-
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed, replica_of
+from app.autopilots.ardupilot.replica.vertical import OUTPUTS
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
-from app.autopilots.loop_check import LoopCheck, Result, Signal, TraceReplay, Upload, grouped, result_of_trace
-from app.core.control.ardupilot import OUTPUTS
-from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
-from app.core.control.ardupilot_replay import LoopTrace, replayed
+from app.autopilots.loop_check import (
+    LoopCheck,
+    Result,
+    Signal,
+    TraceReplay,
+    Upload,
+    grouped,
+    replay_of_log,
+    result_of_trace,
+)
 from app.logs.formats import Format
 
 _PRECISION: Final = "firmware and recording have single precision"
@@ -34,7 +40,8 @@ _UP: Final = "Altitude, climb rate and acceleration are positive up."
 
 
 def _examine_log(upload: Upload) -> Result:
-    compared = _compared(ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name))
+    log = ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name)
+    compared = replay_of_log(log, replica_of(log), log.time_s, gains=log.parameters.gains, notes=_notes)
     return result_of_trace(_SIGNALS, compared, kind="log")
 
 
@@ -54,19 +61,7 @@ def _replayed(trace: LoopTrace) -> TraceReplay:
     )
 
 
-def _compared(log: LoopLog) -> TraceReplay:
-    comparison = compare_log(log)
-    return TraceReplay(
-        time_s=log.time_s - log.time_s[0],
-        recorded=comparison.recorded,
-        replica=comparison.replica,
-        gains=log.parameters.gains,
-        notes=(*_notes(comparison), _UP),
-    ).compared
-
-
-def _notes(comparison: LogComparison) -> Iterable[str]:
-    rows = {name: int(np.isfinite(values).sum()) for name, values in comparison.recorded.items()}
+def _notes(rows: Mapping[str, int]) -> Iterable[str]:
     yield "Climb rate target and demanded throttle were computed from the same row of the log."
     if rows["z_d_m"]:
         yield f"The desired motion was shaped again from the row before, in {grouped(rows['z_d_m'])} rows."
@@ -74,6 +69,7 @@ def _notes(comparison: LogComparison) -> Iterable[str]:
         yield "The desired motion was not shaped again: the log has no position targets (GUIP), or not only those."
     if not rows["throttle"]:
         yield "The demanded throttle was not computed: the log has no PIDA and CTUN beside PSCD."
+    yield _UP
 
 
 CHECK: Final = LoopCheck(

@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.replica import parameters as ardupilot_parameters
+from app.autopilots.ardupilot.replica.copter import shaped
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import Steps, require_channels, segment_of, unanswered, whole_steps
 from app.core.analysis.segment import LEAD_S
-from app.core.control import ardupilot_parameters
 from app.core.control.parameter_checks import PLAUSIBLE, require_within
-from app.core.models.ardupilot_copter import shaped
 from app.core.models.copter import REFERENCE, filtered
 from app.core.models.set_points import SetPoints
 from app.core.records.trajectory import Samples, Trajectory

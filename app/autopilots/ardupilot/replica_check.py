@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history
-from app.autopilots.recording import Column, Recording, refusal
-from app.core.control.ardupilot_log import LoopLog
-from app.core.control.ardupilot_parameters import (
+from app.autopilots.ardupilot.replica.parameters import (
     FIRMWARE_NAMES,
     LOOP_RATE,
     LOOP_RATE_HZ,
@@ -18,6 +16,8 @@ from app.core.control.ardupilot_parameters import (
     UNSUPPORTED,
     parameters_from,
 )
+from app.autopilots.ardupilot.replica.replay import LoopLog
+from app.autopilots.recording import Column, Recording, refusal
 from app.core.errors import InputError
 from app.core.records.trajectory import Samples
 

@@ -10,6 +10,7 @@ from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+from app.autopilots.ardupilot.replica import parameters as loop
 from app.autopilots.ardupilot.simulated_control import LOOP_HZ, ArduPilotController
 from app.autopilots.dialects import ARDUPILOTMEGA, Message
 from app.autopilots.simulated.body import ACCEPTED, FAILED, Body, OutgoingMessage
@@ -25,7 +26,6 @@ from app.autopilots.simulated.copter_parameters import (
     Reaction,
     real,
 )
-from app.core.control import ardupilot_parameters as loop
 from app.core.errors import InputError
 
 _MANUAL: Final = 1 | 16 | 64

@@ -10,10 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.simulated.body import TICK_S, Body
-from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import (
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.parameters import (
     ACCELERATION,
     DESCENT,
     HOVER,
@@ -23,7 +21,9 @@ from app.core.control.ardupilot_parameters import (
     THROTTLE_GAIN,
     Parameters,
 )
-from app.core.control.ardupilot_shaping import inverse_square_root
+from app.autopilots.ardupilot.replica.shaping import inverse_square_root
+from app.autopilots.simulated.body import TICK_S, Body
+from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
 from app.core.models.copter import accelerometer_filter
 
 LOOP_HZ: Final = 1.0 / TICK_S

@@ -5,9 +5,9 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.core.control.ardupilot import INPUTS, OUTPUTS
-from app.core.control.ardupilot_parameters import parameters_from
-from app.core.control.ardupilot_replay import Hover, LoopTrace
+from app.autopilots.ardupilot.replica.parameters import parameters_from
+from app.autopilots.ardupilot.replica.replay import Hover, LoopTrace
+from app.autopilots.ardupilot.replica.vertical import INPUTS, OUTPUTS
 from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 
 COLUMNS: Final = ("t_s", *INPUTS, *OUTPUTS)

@@ -13,14 +13,14 @@ from xml.parsers import expat
 
 import numpy as np
 
+from app.autopilots.paparazzi.ground_log import GroundLog, number_in, read_lines
 from app.autopilots.paparazzi.profile import PAPARAZZI
+from app.autopilots.paparazzi.replica.loop_log import GAINS, FlownGains, LoopLog, flown_gains
 from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
-from app.core.control.loop_log import GAINS, FlownGains, LoopLog, flown_gains
-from app.core.control.paparazzi import FULL_THRUST
+from app.core.control.vertical_guidance import FULL_THRUST
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
 from app.logs.base import refused
-from app.logs.paparazzi import PaparazziLines, number_in, read_lines
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20
 _GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
@@ -68,7 +68,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
     )
 
 
-def _columns(lines: PaparazziLines, loop: LoopLog | None) -> dict[str, Column]:
+def _columns(lines: GroundLog, loop: LoopLog | None) -> dict[str, Column]:
     """Columns of the loop, and of the position if its message is more frequent."""
     channels = {} if loop is None else _loop_channels(loop)
     columns = {name: Column(loop.time_s, values, "VERT_LOOP") for name, values in channels.items() if loop is not None}

@@ -19,28 +19,24 @@ from app.autopilots.loop_check import (
     result_of_trace,
     signal_result,
 )
+from app.autopilots.paparazzi.ground_log import HINT
 from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
-from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
-from app.core.control.loop_log import (
-    COMMANDS,
-    GAINS,
+from app.autopilots.paparazzi.replica.loop_log import COMMANDS, GAINS, CommandCheck, FlownGains, compare_commands
+from app.autopilots.paparazzi.replica.simulation import (
     SIMULATED,
     TIME_TOLERANCE_S,
     TOLERANCES,
     UNITS,
-    CommandCheck,
-    FlownGains,
-    Overlay,
     SimulationCheck,
-    compare_commands,
     compare_simulation,
 )
-from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
+from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
+from app.core.control.vertical_guidance import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
+from app.core.records.overlaid import Overlay
 from app.logs.base import refused
 from app.logs.formats import Format
-from app.logs.paparazzi import HINT
 
 _MAX_DIGITS: Final = 9
 
@@ -247,7 +243,7 @@ CHECK: Final = LoopCheck(
         {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
     ),
     note=_DOWN,
-    log=Format.PAPARAZZI,
+    log=Format.GROUND_LOG,
     is_trace=may_be_loop_trace,
     examine_log=_examine_log,
     examine_trace=_examine_trace,

@@ -43,7 +43,7 @@ from app.autopilots.simulated.body import (
     VerticalCommand,
     whole_ticks,
 )
-from app.core.control.paparazzi import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
+from app.core.control.vertical_guidance import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
 
 KILL: Final = 0
 FAILSAFE: Final = 1

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from app.core.control.paparazzi import INT32_MAX, INT32_MIN
+from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 
 DESCENT_M_S: Final = 0.8
 LANDED_AFTER_S: Final = 3.0

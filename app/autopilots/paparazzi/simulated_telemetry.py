@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.simulated.body import ARMED, Fields
-from app.core.control.paparazzi import POSITION_BITS, SPEED_BITS
+from app.core.control.vertical_guidance import POSITION_BITS, SPEED_BITS
 
 PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(
     {

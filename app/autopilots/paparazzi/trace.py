@@ -9,7 +9,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.core.control.paparazzi import INPUTS, INT32_MAX, INT32_MIN, MODES, OUTPUTS, LoopTrace
+from app.core.control.vertical_guidance import INPUTS, INT32_MAX, INT32_MIN, MODES, OUTPUTS, LoopTrace
 from app.core.errors import InputError, Problem
 from app.logs.trace_table import GZIP, TraceChecks, is_zipped, read_rows, text_of
 

@@ -8,8 +8,8 @@ from typing import Final
 
 from app.autopilots.px4.loop import Px4Loop
 from app.autopilots.px4.recorded_flight import px4_loop, read_px4, straight_reference
+from app.autopilots.px4.replica import parameters as px4_parameters
 from app.core.analysis.flight import LoggedFlight
-from app.core.control import px4_parameters
 from app.core.experiments.base import Experiment, Scatter
 from app.core.experiments.copter_steps import LARGEST_STEP_M, CopterSteps, copter_parameters
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2, step_options

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
 from app.autopilots.px4.loop import SPACE, Px4Loop
+from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
+from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
 from app.autopilots.recording import LONGEST_INTERVAL_S, Parameters, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
     LARGEST_LEAN,
@@ -24,8 +26,6 @@ from app.autopilots.segments import (
 )
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import FinerSegment, Segment
-from app.core.control.px4 import FLIGHT, GRAVITY
-from app.core.control.px4_parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
 from app.core.records.trajectory import Samples
 
 _NEEDED: Final = (

@@ -7,6 +7,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.autopilots.px4.profile import PX4
+from app.autopilots.px4.replica.parameters import LOOP_NAMES
 from app.autopilots.recording import (
     Column,
     Event,
@@ -19,7 +20,6 @@ from app.autopilots.recording import (
     columns_of,
     spans_of,
 )
-from app.core.control.px4_parameters import LOOP_NAMES
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, rows_of
 from app.logs.ulog import has_rows, read_ulog_tables

@@ -8,11 +8,9 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.analysis.hover import found_hover
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
-from app.core.analysis.segment import Segment, Steps, interpolated
-from app.core.control import px4 as loop
-from app.core.control.px4_parameters import (
+from app.autopilots.px4.replica import vertical as loop
+from app.autopilots.px4.replica.copter import fly
+from app.autopilots.px4.replica.parameters import (
     FIRMWARE_NAMES,
     GAINS,
     HOVER_RANGE,
@@ -23,6 +21,9 @@ from app.core.control.px4_parameters import (
     low_pass_gain,
     step_parameters,
 )
+from app.core.analysis.hover import found_hover
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
+from app.core.analysis.segment import Segment, Steps, interpolated
 from app.core.models.copter import (
     DISTURBANCES,
     FLOWN,
@@ -33,7 +34,6 @@ from app.core.models.copter import (
     advance,
     start_body,
 )
-from app.core.models.px4_copter import fly
 from app.core.records.trajectory import Samples
 
 SPACE: Final = GainSpace(

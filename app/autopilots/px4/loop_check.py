@@ -16,16 +16,15 @@ from app.autopilots.loop_check import (
     TraceReplay,
     Upload,
     grouped,
+    replay_of_log,
     result_of_trace,
 )
 from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.replica.replay import LoopTrace, Replay, replayed, replica_of
+from app.autopilots.px4.replica.vertical import OUTPUTS
 from app.autopilots.px4.replica_check import px4_loop_log
 from app.autopilots.px4.trace import is_px4_trace, read_px4_trace
-from app.core.control.px4 import OUTPUTS
-from app.core.control.px4_log import COMPARED, LoopLog, replica_of
-from app.core.control.px4_replay import LoopTrace, Replay, replayed
 from app.core.errors import InputError, Problem
-from app.core.records.trajectory import Samples
 from app.logs.formats import Format
 
 _TOLERANCE: Final = 1e-5
@@ -62,7 +61,9 @@ _HOW: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
 
 
 def _examine_log(upload: Upload) -> Result:
-    compared = _compared(px4_loop_log(read_px4(upload.stream), name=upload.name))
+    log = px4_loop_log(read_px4(upload.stream), name=upload.name)
+    time_s = log.time_s[log.place]
+    compared = replay_of_log(log, replica_of(log), time_s, gains=log.parameters.gains, notes=_log_notes)
     if not compared.recorded:
         raise InputError(
             f"{upload.name} cannot be compared with the replica.",
@@ -97,27 +98,14 @@ def _order_notes(replay: Replay) -> Iterable[str]:
         yield "The recording fits if the spool-up began one row before it."
 
 
-def _compared(log: LoopLog) -> TraceReplay:
-    replica = replica_of(log)
-    recorded = {name: np.where(np.isfinite(replica[name]), getattr(log, name), np.nan) for name in COMPARED}
-    time_s = log.time_s[log.place]
-    return TraceReplay(
-        time_s=time_s - time_s[0],
-        recorded=recorded,
-        replica=replica,
-        gains=log.parameters.gains,
-        notes=(*_log_notes(recorded), _DOWN),
-    ).compared
-
-
-def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
-    rows = {name: int(np.isfinite(values).sum()) for name, values in recorded.items()}
+def _log_notes(rows: Mapping[str, int]) -> Iterable[str]:
     for name, (how, missing) in _HOW.items():
         title = f"The {_SIGNALS[name].title.lower()}"
         if rows[name]:
             yield f"{title} was computed from {how}, in {grouped(rows[name])} rows."
         else:
             yield f"{title} was not computed: {missing}."
+    yield _DOWN
 
 
 def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kind: Kind) -> Result:

@@ -6,22 +6,23 @@ from types import MappingProxyType
 from typing import Final
 
 from app.autopilots import commands, mavlink
-from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, Requirement
+from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, HoverLimits, Requirement
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.gains import on_board
 from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
-from app.autopilots.simulated.body import SimulatedKind
-from app.core.control.px4_parameters import (
+from app.autopilots.px4.replica.parameters import (
     ESTIMATOR_NAMES,
     HOVER_RANGE_NAME,
+    HOVER_THRUSTS,
     LOOP_NAMES,
     UNSUPPORTED,
     hover_deviation,
     hover_limits,
 )
+from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import InputError
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
@@ -48,13 +49,16 @@ _STREAMED_FOR_S: Final = 1.2
 """It accepts the offboard mode once set points have arrived for a second."""
 
 
-def _hover_limits(parameters: Mapping[str, float]) -> tuple[float, float] | None:
+def _hover_limits(parameters: Mapping[str, float]) -> HoverLimits | None:
     """Return those of its estimator; None if its parameter is not known."""
-    assumed = parameters.get(_HOVER)
+    if _HOVER not in parameters:
+        return None
     try:
-        return None if assumed is None else hover_limits(assumed, hover_deviation(parameters))
+        low, high = hover_limits(parameters[_HOVER], hover_deviation(parameters))
     except InputError as error:
         raise AutopilotError(str(error), hint=f"Correct {HOVER_RANGE_NAME} on the vehicle, then try again.") from error
+    words = f"within {_HOVER} ± {HOVER_RANGE_NAME}, {low:.2f} … {high:.2f}: PX4's estimate stops there"
+    return HoverLimits(low, high, words, _HOVER, HOVER_THRUSTS[1])
 
 
 def _steps(action: Action, target: Target) -> tuple[Step, ...]:

@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.replica import parameters as px4_parameters
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.hover import found_hover
 from app.core.analysis.recorded_flight import Steps, require_channels, segment_of, whole_steps
 from app.core.analysis.segment import LEAD_S
-from app.core.control import px4_parameters
 from app.core.control.parameter_checks import PLAUSIBLE, require_within
 from app.core.models.copter import REFERENCE
 from app.core.models.set_points import SetPoints

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.log import SOURCES, TARGET
+from app.autopilots.px4.replica.parameters import FIRMWARE_NAMES, GAINS, UNSUPPORTED, Parameters, parameters_from
+from app.autopilots.px4.replica.replay import LoopLog
+from app.autopilots.px4.replica.vertical import FLIGHT, HOVER_MAX, HOVER_MIN, RAMP_UP
 from app.autopilots.recording import Recording, refusal
-from app.core.control.px4 import FLIGHT, HOVER_MAX, HOVER_MIN, RAMP_UP
-from app.core.control.px4_log import LoopLog
-from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, UNSUPPORTED, Parameters, parameters_from
 from app.core.errors import InputError
 from app.core.records.trajectory import Samples
 

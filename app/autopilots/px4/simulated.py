@@ -13,6 +13,7 @@ from typing import ClassVar, Final
 
 from app.autopilots.dialects import COMMON
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
+from app.autopilots.px4.replica import parameters as loop
 from app.autopilots.px4.simulated_control import Px4Controller
 from app.autopilots.simulated.body import ACCEPTED, TEMPORARILY_REJECTED, Body, OutgoingMessage
 from app.autopilots.simulated.copter import Copter, copter_kind
@@ -28,7 +29,6 @@ from app.autopilots.simulated.copter_parameters import (
     real,
 )
 from app.autopilots.simulated.copter_telemetry import HOME_AMSL_M
-from app.core.control import px4_parameters as loop
 from app.core.errors import InputError
 
 _MANUAL: Final = 1 | 16 | 64

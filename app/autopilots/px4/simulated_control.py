@@ -12,11 +12,11 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.px4 import simulated_hover as px4_hover
+from app.autopilots.px4.replica import vertical as loop
+from app.autopilots.px4.replica.parameters import parameters_from
 from app.autopilots.px4.simulated_trajectory import Limits, Trajectory
 from app.autopilots.simulated.body import TICK_S, Body
 from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
-from app.core.control import px4 as loop
-from app.core.control.px4_parameters import parameters_from
 
 LOOP_TICKS: Final = 2
 LOOP_S: Final = LOOP_TICKS * TICK_S

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.px4_parameters import hover_limits
+from app.autopilots.px4.replica.parameters import hover_limits
 from app.core.kernels import kernel
 from app.core.models.copter import GRAVITY_M_S2
 from app.core.records.trajectory import Samples

@@ -5,9 +5,9 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.core.control.px4 import INPUTS, OUTPUTS
-from app.core.control.px4_parameters import STEP_S, parameters_from
-from app.core.control.px4_replay import LoopTrace
+from app.autopilots.px4.replica.parameters import STEP_S, parameters_from
+from app.autopilots.px4.replica.replay import LoopTrace
+from app.autopilots.px4.replica.vertical import INPUTS, OUTPUTS
 from app.core.records.trajectory import Samples
 from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, Protocol, Self
 
 from app.autopilots.dialects import Dialect, FieldValue
-from app.core.control.paparazzi import RATE_HZ, THROTTLE
+from app.core.control.vertical_guidance import RATE_HZ, THROTTLE
 
 TICK_STEPS: Final = 2
 """Steps of the simulation between two updates of the autopilot's radio, timers and flight plan."""

@@ -3,7 +3,7 @@ linear model in hover, and its words."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, Self, TypeVar
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class LoopTexts(MarginTexts):
     do, `other_controller` what may have flown instead of this loop.
     """
 
-    autopilot: Literal["ArduCopter", "PX4"]
+    autopilot: str
     prefix: str
     hover_parameter: str
     hover_range: tuple[float, float]

@@ -6,8 +6,8 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.core.analysis.paparazzi_loop import PaparazziLoop
-from app.core.control.paparazzi import POSITION_BITS, RATE_HZ, STEP_S
+from app.core.analysis.linear_guidance import LinearGuidance
+from app.core.control.vertical_guidance import POSITION_BITS, RATE_HZ, STEP_S
 from app.core.definition import OptionValue
 from app.core.experiments.base import Check, Envelope, Matrix, ModelParameter, ParameterDistribution, Scatter
 from app.core.experiments.copter_steps_hazards import COPTERS, check_margin
@@ -105,7 +105,7 @@ class AltitudeSteps(VerticalLoop):
         """As of all flights under this loop, and the margin from ringing."""
         return (
             *super().hazards(gains, spread, envelope),
-            check_margin(PaparazziLoop(gains), list(spread.sample(self, COPTERS))),
+            check_margin(LinearGuidance(gains), list(spread.sample(self, COPTERS))),
         )
 
     def errors(self, outputs: Matrix) -> Vector:

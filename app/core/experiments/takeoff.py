@@ -8,7 +8,7 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.core.control.paparazzi import RATE_HZ
+from app.core.control.vertical_guidance import RATE_HZ
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment, Matrix, ModelParameter, Scatter
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts

@@ -8,7 +8,7 @@ from typing import ClassVar, Final, Self
 
 import numpy as np
 
-from app.core.control.paparazzi import RATE_HZ
+from app.core.control.vertical_guidance import RATE_HZ
 from app.core.experiments.base import (
     Check,
     Envelope,

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ERROR_SUM_MAX,
     INT32_MAX,
     POSITION_ERROR_MAX,

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.paparazzi import POSITION_BITS, RATE_HZ, fix
+from app.core.control.vertical_guidance import POSITION_BITS, RATE_HZ, fix
 from app.core.records.flight_events import FlightEvent
 from app.core.records.trajectory import Samples
 

@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ALT,
     FB_CMD,
     FF_CMD,

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ALT,
     CHECK_PHASE,
     ERROR_SUM_MAX,
@@ -183,7 +183,7 @@ def _set_up(gains: Counts, models: Samples, runs: Samples, whole: Counts) -> Non
 
 @kernel
 def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, guide: Samples, i: int) -> None:
-    """Step i of the loop and of the model for each run: `control.paparazzi.step` in doubles, then `advance`."""
+    """Step i of the loop and of the model for each run: `control.vertical_guidance.step` in doubles, then `advance`."""
     now, seconds = (i & (PAST - 1)) * BATCH_WIDTH, i * STEP_S
     position, speed, feed_forward = guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i]
     for lane in range(lanes):

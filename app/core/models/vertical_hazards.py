@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ALT,
     CLIMB,
     INT32_MAX,

@@ -6,8 +6,8 @@ from typing import Final, Generic, TypeVar
 
 import numpy as np
 
+from app.core.analysis.linear_guidance import LinearGuidance
 from app.core.analysis.loop import GainSpace
-from app.core.analysis.paparazzi_loop import PaparazziLoop
 from app.core.definition import Flight, best_flight
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
@@ -104,8 +104,8 @@ class StepsModel(VerticalModel[AltitudeSteps], LimitedModel[Vector]):
     def vehicles(self) -> Sequence[Vector]:
         return list(self.spread.sample(self._experiment, COPTERS))
 
-    def loop(self, gains: Vector) -> PaparazziLoop:
-        return PaparazziLoop(gains)
+    def loop(self, gains: Vector) -> LinearGuidance:
+        return LinearGuidance(gains)
 
     @cached_property
     def _weather(self) -> tuple[Matrix, Vector, Matrix]:

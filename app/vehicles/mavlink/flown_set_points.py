@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.core.control.paparazzi import RATE_HZ, STEP_S
+from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.experiments.step_sequence import REFERENCE
 from app.core.models.set_points import SetPoints, on_step
 from app.core.models.vertical_batch import reference_altitude

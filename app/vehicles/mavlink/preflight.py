@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from app.autopilots.autopilot import Requirement
+from app.autopilots.autopilot import HoverLimits, Requirement
 from app.autopilots.measurements import VehicleEvent
-from app.core.control.px4_parameters import HOVER_THRUSTS
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import (
@@ -169,17 +168,16 @@ def evaluate_set_points(set_points: SetPoints) -> CheckItem:
     )
 
 
-def evaluate_hover(hover_throttle: float | None, limits: tuple[float, float] | None) -> tuple[CheckItem, ...]:
+def evaluate_hover(hover_throttle: float | None, limits: HoverLimits | None) -> tuple[CheckItem, ...]:
     """Check that the autopilot's estimate can reach the throttle at which the vehicle hovered in its last flight; no
     item while one of the two is not known."""
     if hover_throttle is None or limits is None:
         return ()
-    low, high = limits
     item = HOVER.item(
-        low <= hover_throttle <= high,
+        limits.low <= hover_throttle <= limits.high,
         f"{hover_throttle:.2f} in the last flight",
-        f"within MPC_THR_HOVER ± HTE_THR_RANGE, {low:.2f} … {high:.2f}: PX4's estimate stops there",
-        hint=f"Set MPC_THR_HOVER to {min(hover_throttle, HOVER_THRUSTS[1]):.2f}. If the vehicle or its load was "
+        limits.words,
+        hint=f"Set {limits.parameter} to {min(hover_throttle, limits.most):.2f}. If the vehicle or its load was "
         "changed since that flight, disconnect it and connect it again instead.",
     )
     return (item,)

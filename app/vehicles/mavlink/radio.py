@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from app.autopilots.autopilot import ArmingChecks, Autopilot, AutopilotError, ReferenceSource
+from app.autopilots.autopilot import ArmingChecks, Autopilot, AutopilotError, HoverLimits, ReferenceSource
 from app.autopilots.commands import TARGET, Action, Outgoing, Step, Target
 from app.autopilots.dialects import Message, source_component
 from app.autopilots.measurements import (
@@ -249,7 +249,7 @@ class AutopilotLink:
         except AutopilotError as error:
             raise VehicleError(error.message, hint=error.hint) from error
 
-    def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
+    def hover_limits(self, parameters: Mapping[str, float]) -> HoverLimits | None:
         """Return those of `Autopilot.hover_limits`. Raises VehicleError for a parameter out of its range."""
         try:
             return self.profile.hover_limits(parameters)

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.replica.parameters import Parameters
+from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY, INPUTS, OUTPUTS
 from app.autopilots.px4.trace import read_px4_trace
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import FinerSegment
-from app.core.control.px4 import FLIGHT, GRAVITY, INPUTS, OUTPUTS
-from app.core.control.px4_parameters import Parameters
 from app.core.records.trajectory import Samples
 from bench.copters.px4_simulation import Manoeuvre, fly_changes
 from bench.copters.simulation import SimulatedCopter

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.copter import fly
+from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.margin import (
     EXTRA_LAG_S,
     LARGEST_MARGIN,
@@ -15,9 +18,6 @@ from app.core.analysis.margin import (
     gain_margin,
     least_damping,
 )
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import Parameters
-from app.core.models.ardupilot_copter import fly
 from app.core.models.copter import DISTURBANCES, FLOWN, REFERENCE, Copter, start_body
 from bench.copters.simulation import loop_of
 from tests.core.analysis.flights import with_gains_of

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from app.autopilots.px4.loop import SPACE, Px4Loop
+from app.autopilots.px4.replica.parameters import STEP_S, Parameters
 from app.core.analysis.analysis import analyze
 from app.core.analysis.loop import GainSpace
 from app.core.analysis.margin import RINGING_DAMPING, gain_margin, least_damping
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
-from app.core.control.px4_parameters import STEP_S, Parameters
 from app.core.errors import TrajectoryError
 from app.core.models.copter import FLOWN, Copter
 from bench.copters.px4_simulation import fly_changes, loop_of, sample_px4

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.vehicle_fit import fit_copter
-from app.core.control.ardupilot_parameters import Parameters
 from bench.copters.simulation import fly_steps, sample
 from tests.core.analysis.flights import GUSTY, QUIET, recorded_steps, simulated_flight
 from tests.core.tuning.flying import compiled_only

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.control.paparazzi import INT32_MAX, INT32_MIN, divide, fix, limit, wrap32
+from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN, divide, fix, limit, wrap32
 
 INT32 = st.integers(INT32_MIN, INT32_MAX)
 

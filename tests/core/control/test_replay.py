@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.paparazzi.trace import read_loop_trace
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     FB_CMD,
     FF_CMD,
     FULL_THRUST,
@@ -19,7 +19,6 @@ from app.core.control.paparazzi import (
     ZD_REF,
     ZDD_REF,
     LoopTrace,
-    compared,
     detect_flight,
     new_state,
     replayed,
@@ -41,21 +40,8 @@ def test_all_seven_recorded_traces_are_here() -> None:
 @pytest.mark.parametrize("path", TRACES, ids=lambda path: path.name)
 def test_the_replica_reproduces_every_column_of_every_row(path: Path) -> None:
     trace = read_loop_trace(path)
-    replay = compared(trace, replayed(trace))
-    assert replay.rows == len(trace) >= 6144
-    assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0)
-    assert replay.exact
-
-
-def test_one_wrong_number_is_found_with_its_row_and_size() -> None:
-    trace = read_loop_trace(TRACES[0])
-    wrong = trace.outputs.copy()
-    wrong[3000, OUTPUTS.index("fb_cmd")] += 7
-    wrong[4000, OUTPUTS.index("fb_cmd")] -= 9
-    replay = compared(LoopTrace(trace.inputs, wrong), replayed(trace))
-    assert not replay.exact
-    assert replay.first_different_row == 3000
-    assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0) | {"fb_cmd": 9}
+    assert len(trace) >= 6144
+    np.testing.assert_array_equal(replayed(trace), trace.outputs)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.core.control.paparazzi import (
+from app.core.control.vertical_guidance import (
     ALT,
     ERROR_SUM_MAX,
     FB_CMD,

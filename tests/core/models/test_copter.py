@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import STEP_S, Parameters
-from app.core.models.ardupilot_copter import fly, step
+from app.autopilots.ardupilot.replica import vertical as loop
+from app.autopilots.ardupilot.replica.copter import fly, step
+from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.core.models.copter import (
     ALTITUDE,
     CLIMB_RATE,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.core.control.paparazzi import RATE_HZ
+from app.core.control.vertical_guidance import RATE_HZ
 from app.core.experiments.base import Matrix, ParameterDistribution
 from app.core.experiments.takeoff import Takeoff
 from app.core.models.set_points import SetPoints

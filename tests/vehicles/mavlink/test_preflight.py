@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.autopilots.autopilot import AutopilotError
+from app.autopilots.autopilot import AutopilotError, HoverLimits
 from app.autopilots.measurements import Position
 from app.autopilots.registry import AUTOPILOTS
 from app.core.models.set_points import SetPoints
@@ -45,7 +45,11 @@ def test_the_hover_throttle_of_the_last_flight_must_be_within_what_px4_finds(hov
 
 
 def test_a_hover_throttle_that_is_not_known_or_has_no_limits_is_not_checked() -> None:
-    assert evaluate_hover(None, (0.3, 0.7)) == evaluate_hover(0.9, AUTOPILOTS["px4"].hover_limits({})) == ()
+    assert (
+        evaluate_hover(None, HoverLimits(0.3, 0.7, "", "", 0.8))
+        == evaluate_hover(0.9, AUTOPILOTS["px4"].hover_limits({}))
+        == ()
+    )
     for name in ("ardupilot", "paparazzi"):
         assert evaluate_hover(0.9, AUTOPILOTS[name].hover_limits({"MOT_THST_HOVER": 0.3})) == ()
 

@@ -2485,8 +2485,10 @@ export type LogAnalysis = {
     file_name: string;
     /**
      * Autopilot
+     *
+     * its title
      */
-    autopilot: 'ArduCopter' | 'PX4' | 'Paparazzi';
+    autopilot: string;
     /**
      * Answer
      */
@@ -2497,6 +2499,18 @@ export type LogAnalysis = {
      * whether gains are proposed; if not, `answer` says why
      */
     proposes: boolean;
+    /**
+     * Starts Campaign
+     *
+     * whether a campaign can start from this log
+     */
+    starts_campaign: boolean;
+    /**
+     * Experiment
+     *
+     * of this campaign, for a vehicle that flies it; null: the vehicle is flown elsewhere
+     */
+    experiment: string | null;
     /**
      * Flight
      *

@@ -17,7 +17,6 @@ import classes from "./Checks.module.css";
 
 const FIGURE_HEIGHT_PX = 560;
 const ROW_PX = 37;
-const STEPS: Readonly<Record<string, string>> = { ArduCopter: "altitude-steps-ardupilot", PX4: "altitude-steps-px4" };
 
 /** Better altitude gains from the log of a flight, without a campaign. */
 export function LogAnalysisPage() {
@@ -95,7 +94,7 @@ interface ResultProps {
 }
 
 function Result({ analysis, files }: ResultProps) {
-  const { file_name, autopilot, answer, proposes, flight, vehicle, gains, notes, parameter_file, figures } = analysis;
+  const { file_name, answer, proposes, flight, vehicle, gains, notes, parameter_file, figures } = analysis;
   const figure = figures[useComputedColorScheme("light")];
   const columns = gains.columns.map((title) => ({ name: title, title, unit: "", digits: null }));
   return (
@@ -117,9 +116,7 @@ function Result({ analysis, files }: ResultProps) {
           ))}
         </ul>
         <Group gap={10} mt="sm">
-          {(autopilot === "Paparazzi" || proposes) && (
-            <StartCampaign key={file_name} files={files} autopilot={autopilot} />
-          )}
+          {analysis.starts_campaign && <StartCampaign key={file_name} files={files} experiment={analysis.experiment} />}
           {parameter_file !== null && (
             <Button
               component="a"
@@ -139,12 +136,12 @@ function Result({ analysis, files }: ResultProps) {
 }
 
 /** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
-function StartCampaign({ files, autopilot }: { files: RecordFiles; autopilot: LogAnalysis["autopilot"] }) {
+function StartCampaign({ files, experiment }: { files: RecordFiles; experiment: string | null }) {
   const { mutate, error, isPending } = useStartCampaign();
   const navigate = useNavigate();
   const [chosen, setChosen] = useState("");
   const flying = (useVehicles().data ?? []).filter(
-    ({ registered, experiments }) => registered && experiments.includes(STEPS[autopilot] ?? ""),
+    ({ registered, experiments }) => registered && experiments.includes(experiment ?? ""),
   );
   const isOpen = flying.length > 1 && chosen === "";
   return (

@@ -1,6 +1,8 @@
 import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
+import { Fragment } from "react";
 import { Link } from "react-router";
+import { useCatalogue } from "../../api/queries";
 import { useVehicles } from "../../api/vehicles";
 import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
@@ -56,18 +58,27 @@ export function VehiclesPage() {
 
 /** Empty state: explains registration, and how to try it without a drone. */
 function NoVehicles() {
+  const [usual, ...others] = useCatalogue().data?.autopilots ?? [];
   return (
     <div className={classes["teach"]}>
       <p>
         <strong>No vehicle is registered yet.</strong> A registered vehicle keeps its link open between flights. Every
         page shows its battery, gains and operator.
       </p>
-      <p>
-        To try it without a drone, run <code>gainline sim-drone</code> in a terminal (from a checkout{" "}
-        <code>./dev exec gainline sim-drone</code>) and register it as simulated, with the autopilot Paparazzi at{" "}
-        <code>udp:127.0.0.1:4245@4244</code>. With <code>--autopilot px4</code> or <code>--autopilot ardupilot</code>,
-        it is at <code>udpin:127.0.0.1:14550</code>.
-      </p>
+      {usual && (
+        <p>
+          To try it without a drone, run <code>gainline sim-drone</code> in a terminal (from a checkout{" "}
+          <code>./dev exec gainline sim-drone</code>) and register it as simulated, with the autopilot {usual.title} at{" "}
+          <code>{usual.simulated_address}</code>. With{" "}
+          {others.map(({ name }, place) => (
+            <Fragment key={name}>
+              {place > 0 && " or "}
+              <code>--autopilot {name}</code>
+            </Fragment>
+          ))}
+          , it is at <code>{others[0]?.simulated_address}</code>.
+        </p>
+      )}
     </div>
   );
 }

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from app.core.control.px4_parameters import (
+from app.autopilots.px4.replica.parameters import (
     DERIVATIVE_GAIN,
     VELOCITY_GAIN,
     Parameters,

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.px4 import THRUST, State, rollout
-from app.core.control.px4_parameters import Packed
+from app.autopilots.px4.replica.parameters import Packed
+from app.autopilots.px4.replica.vertical import THRUST, State, rollout
 from app.core.kernels import kernel
 from app.core.models.copter import ALTITUDE, CLIMB_RATE, SENSED, advance
 from app.core.records.trajectory import Samples

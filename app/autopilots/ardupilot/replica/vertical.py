@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.ardupilot_parameters import (
+from app.autopilots.ardupilot.replica.parameters import (
     ACCELERATION,
     ACCELERATION_D,
     ACCELERATION_D_FF,
@@ -42,7 +42,7 @@ from app.core.control.ardupilot_parameters import (
     VELOCITY_P,
     Packed,
 )
-from app.core.control.ardupilot_shaping import (
+from app.autopilots.ardupilot.replica.shaping import (
     LARGEST_DESCENT_ACCELERATION_M_S2,
     approach_rate,
     clip,

@@ -2,7 +2,6 @@
 message's name and its fields, separated by blanks.
 """
 
-import re
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,24 +9,19 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.core.control.loop_log import FIELDS, LoopLog
-from app.core.control.paparazzi import INT32_MAX, INT32_MIN
+from app.autopilots.paparazzi.replica.loop_log import FIELDS, LoopLog
+from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 from app.logs.base import refused
+from app.logs.formats import is_ground_log
 
 _MAX_SAMPLES: Final = 2_000_000
 _MAX_LINE_BYTES: Final = 4096
-_LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
 _WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
 HINT: Final = "Use the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
 
 
-def is_paparazzi(head: bytes) -> bool:
-    """Whether a file with this head is a .data file."""
-    return bool(_LINE.match(head))
-
-
 @dataclass(slots=True)
-class PaparazziLines:
+class GroundLog:
     """Messages of one aircraft: the first one that reports its altitude."""
 
     aircraft: str = ""
@@ -47,11 +41,11 @@ class PaparazziLines:
         return LoopLog(time_s[rising], values[rising])
 
 
-def read_lines(stream: BinaryIO) -> PaparazziLines:
+def read_lines(stream: BinaryIO) -> GroundLog:
     """Parse the stream; lines other than these messages are skipped."""
-    lines = PaparazziLines()
+    lines = GroundLog()
     stream.seek(0)
-    if not is_paparazzi(stream.read(_MAX_LINE_BYTES)):
+    if not is_ground_log(stream.read(_MAX_LINE_BYTES)):
         raise refused("does not start with a line of time, aircraft and message", HINT)
     stream.seek(0)
     while line := stream.readline(_MAX_LINE_BYTES):
@@ -61,7 +55,7 @@ def read_lines(stream: BinaryIO) -> PaparazziLines:
     return lines
 
 
-def _take(lines: PaparazziLines, time: bytes, aircraft: str, message: bytes, fields: Sequence[bytes]) -> None:
+def _take(lines: GroundLog, time: bytes, aircraft: str, message: bytes, fields: Sequence[bytes]) -> None:
     time_s = number_in(time)
     if not np.isfinite(time_s) or (lines.aircraft and aircraft != lines.aircraft):
         lines.others.update([aircraft] if len(lines.others) < 5 and aircraft != lines.aircraft else [])

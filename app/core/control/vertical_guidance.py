@@ -7,7 +7,6 @@ code; only the reference altitude is 64-bit. `step` is the kernel, on a state ar
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -218,19 +217,6 @@ class LoopTrace:
         return len(self.inputs)
 
 
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """Comparison of the replica with a trace: rows replayed, and the largest |difference| of each output column."""
-
-    rows: int
-    largest_difference: Mapping[str, int]
-    first_different_row: int | None
-
-    @property
-    def exact(self) -> bool:
-        return self.first_different_row is None
-
-
 def replayed(trace: LoopTrace) -> NDArray[np.int64]:
     """The replica's own outputs, shape (n, 7), started at the first row's z and zd and stepped once per row."""
     computed, rows = np.empty_like(trace.outputs), trace.inputs.tolist()
@@ -239,14 +225,3 @@ def replayed(trace: LoopTrace) -> NDArray[np.int64]:
         computed[row, -1] = step(state, mode, target, kp, ki, kd, z, zd, r33, bool(in_flight))
         computed[row, :-1] = state[_IN_STATE]
     return computed
-
-
-def compared(trace: LoopTrace, computed: NDArray[np.int64]) -> Replay:
-    """Compare `computed`, shape (n, 7), with the recorded outputs."""
-    difference = np.abs(computed - trace.outputs)
-    different = np.flatnonzero(difference.any(axis=1))
-    return Replay(
-        len(trace),
-        {name: int(value) for name, value in zip(OUTPUTS, difference.max(axis=0), strict=True)},
-        int(different[0]) if different.size else None,
-    )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.replica.parameters import STEP_S, Parameters
 from app.core.analysis.loop import Run
-from app.core.control.px4_parameters import STEP_S, Parameters
 from app.core.models.copter import DISTURBANCES, FLOWN, GRAVITY_M_S2, REFERENCE, Copter
 from app.core.records.trajectory import Samples
 

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from app.core.control.ardupilot_parameters import (
+from app.autopilots.ardupilot.replica.parameters import (
     ACCELERATION_IMAX,
     HOVER,
     RAMP_END,

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.ardupilot.trace import read_ardupilot_trace
-from app.core.control.ardupilot import (
+from app.autopilots.ardupilot.replica.parameters import POSITION_P, STEP_S, Packed, Parameters
+from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
+from app.autopilots.ardupilot.replica.vertical import (
     A_T,
     ACCELERATION_SUM,
     FLIGHT,
@@ -32,10 +33,9 @@ from app.core.control.ardupilot import (
     start_takeoff,
     take_off,
 )
-from app.core.control.ardupilot_parameters import POSITION_P, STEP_S, Packed, Parameters
-from app.core.control.ardupilot_replay import LoopTrace, replayed
+from app.autopilots.ardupilot.trace import read_ardupilot_trace
 
-TRACES = sorted((Path(__file__).parents[2] / "data" / "ardupilot_loop").glob("*.csv.gz"))
+TRACES = sorted((Path(__file__).parents[3] / "data" / "ardupilot_loop").glob("*.csv.gz"))
 TOLERANCES = np.array([1e-5, 2e-6, 1.2e-5, 4e-5, 1e-4, 0.01, 5e-5, 2e-5])
 """Of each output, over whole recordings, whose seven digits are 10 µm from 10 m on: asked are 1e-4 of z_d and v_t and
 5e-4 of the throttle, which a replica in double precision does not reach in `steps_limits`."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from app.core.analysis.linear_guidance import LinearGuidance
 from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, gain_margin, least_damping
-from app.core.analysis.paparazzi_loop import PaparazziLoop
 from bench.copters.paparazzi_simulation import SteppedVehicle
 from bench.copters.paparazzi_simulation import least_damping as least_damping_in_steps
 
@@ -40,7 +40,7 @@ def test_the_damping_is_that_of_the_loop_step_by_step(
     named = dict(zip(("kp", "ki", "kd"), gains, strict=True))
     in_steps = least_damping_in_steps(vehicle, named, factor=factor, late_s=late_s)
     found = least_damping(
-        PaparazziLoop(np.array(gains)).with_fast_gains(factor), model(lag_s, delay_s, share), late_s=late_s
+        LinearGuidance(np.array(gains)).with_fast_gains(factor), model(lag_s, delay_s, share), late_s=late_s
     )
     assert min(found, 0.3) == pytest.approx(min(in_steps, 0.3), abs=0.02)
 
@@ -48,6 +48,6 @@ def test_the_damping_is_that_of_the_loop_step_by_step(
 def test_the_defaults_have_the_margin_everywhere_and_the_largest_gains_on_fast_motors_only() -> None:
     """The real firmware flew the largest gains in its own simulation, whose motors have no lag, without ringing."""
     fast, slow = model(0.0, 0.0, 0.0), model(0.1, 0.04, 1.0)
-    assert all(gain_margin(PaparazziLoop(np.array(DEFAULT)), each) > 4.0 for each in (fast, slow))
-    assert gain_margin(PaparazziLoop(np.array(LARGEST)), fast) > 2.0
-    assert damping_within_margin(PaparazziLoop(np.array(LARGEST)), slow) < RINGING_DAMPING
+    assert all(gain_margin(LinearGuidance(np.array(DEFAULT)), each) > 4.0 for each in (fast, slow))
+    assert gain_margin(LinearGuidance(np.array(LARGEST)), fast) > 2.0
+    assert damping_within_margin(LinearGuidance(np.array(LARGEST)), slow) < RINGING_DAMPING

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.px4.trace import read_px4_trace
-from app.core.control.px4 import (
+from app.autopilots.px4.replica.parameters import Packed, Parameters
+from app.autopilots.px4.replica.replay import LoopTrace, replayed
+from app.autopilots.px4.replica.vertical import (
     ACCELERATION_TARGET,
     DISARMED,
     FLIGHT,
@@ -31,11 +32,10 @@ from app.core.control.px4 import (
     start,
     start_hover,
 )
-from app.core.control.px4_parameters import Packed, Parameters
-from app.core.control.px4_replay import LoopTrace, replayed
+from app.autopilots.px4.trace import read_px4_trace
 from app.core.records.trajectory import Samples
 
-DATA = Path(__file__).parents[2] / "data" / "px4_loop"
+DATA = Path(__file__).parents[3] / "data" / "px4_loop"
 FLIGHTS = {
     "default_steps_push.csv.gz": ((1550, 6283, 10354, 10484), False),
     "stiff_steps_push.csv.gz": ((1760, 2596, 5293, 6078, 7999, 8279, 8342), False),

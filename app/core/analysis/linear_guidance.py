@@ -1,4 +1,4 @@
-"""Paparazzi's vertical loop about hover, as a margin takes it: linear, on the model of `app.core.models.vertical`."""
+"""The vertical guidance about hover, as a margin takes it: linear, on the model of `app.core.models.vertical`."""
 
 from dataclasses import dataclass
 from typing import Final, Self
@@ -6,7 +6,7 @@ from typing import Final, Self
 import numpy as np
 
 from app.core.analysis.loop import MarginTexts
-from app.core.control.paparazzi import FULL_THRUST, STEP_S
+from app.core.control.vertical_guidance import FULL_THRUST, STEP_S
 from app.core.models.vertical import (
     DRAG_1_S,
     GRAVITY_M_S2,
@@ -25,7 +25,7 @@ ki, kd of 1: what the fractional bits and the shifts of the loop leave."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PaparazziLoop:
+class LinearGuidance:
     """A `LinearLoop` with the gains kp, ki, kd, in counts, shape (3,); vehicles are model vectors, shape (8,)."""
 
     gains: Vector

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from app.core.control.ardupilot import (
+from app.autopilots.ardupilot.replica.parameters import DT, THROTTLE_GAIN, Packed
+from app.autopilots.ardupilot.replica.vertical import (
     A_D,
     STATE_SIZE,
     THROTTLE,
@@ -14,7 +15,6 @@ from app.core.control.ardupilot import (
     shape,
     start_hover,
 )
-from app.core.control.ardupilot_parameters import DT, THROTTLE_GAIN, Packed
 from app.core.kernels import kernel
 from app.core.models.copter import ALTITUDE, CLIMB_RATE, SENSED, advance
 from app.core.records.trajectory import Samples

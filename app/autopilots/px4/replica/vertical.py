@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.px4_parameters import (
+from app.autopilots.px4.replica.parameters import (
     CLIMB,
     DERIVATIVE_GAIN,
     HOVER,

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from app.core.control.ardupilot import (
+from app.autopilots.ardupilot.replica.parameters import Parameters
+from app.autopilots.ardupilot.replica.shaping import inverse_square_root, square_root
+from app.autopilots.ardupilot.replica.vertical import (
     A_D,
     POSITION_ERROR,
     SATURATED,
@@ -15,8 +17,6 @@ from app.core.control.ardupilot import (
     Z_D,
     shape,
 )
-from app.core.control.ardupilot_parameters import Parameters
-from app.core.control.ardupilot_shaping import inverse_square_root, square_root
 
 DT = 0.0025
 CLIMB, DESCENT, ACCELERATION, JERK = 2.5, 1.5, 1.0, 5.0

@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 
 from app.autopilots.paparazzi.log import read_paparazzi
-from app.core.control import paparazzi as loop
-from app.core.control.loop_log import (
+from app.autopilots.paparazzi.replica.loop_log import (
     FIELDS,
     CommandCheck,
     FlownGains,
     LoopLog,
-    SimulationCheck,
     compare_commands,
-    compare_simulation,
     flown_gains,
     infer_gains,
 )
+from app.autopilots.paparazzi.replica.simulation import SimulationCheck, compare_simulation
+from app.core.control import vertical_guidance as loop
 from app.core.policy import Gains
 from tests.logs.paparazzi_flights import Flight, data_of
 

@@ -1,0 +1,1 @@
+"""ArduCopter's altitude control, replicated: pure numerics, which import the core alone."""

@@ -1,0 +1,1 @@
+"""PX4's altitude control, replicated: pure numerics, which import the core alone."""
