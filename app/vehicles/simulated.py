@@ -139,7 +139,6 @@ class Simulation(Protocol):
     def advance(self, steps: int, command: Integers) -> Rows:
         """Fly `steps` steps of 1/512 s under the autopilot's `command`; return one row of `CHANNELS` for each, shape
         (steps, 8), with the measurements at the beginning of the step and the resulting thrust."""
-        ...
 
 
 class GainHolder:

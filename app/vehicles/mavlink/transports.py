@@ -50,24 +50,19 @@ class Transport(Protocol):
     @property
     def remote(self) -> Peer | None:
         """Peer that `write` sends to; None until it is known (`adopt`)."""
-        ...
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         """Return the data received, each a datagram or a piece of a stream, with its sender: over UDP anybody can send.
         Waits at most `timeout_s` for the first, or until `wake`."""
-        ...
 
     def write(self, data: bytes) -> bool:
         """Send without waiting; return false without a peer or connection, or if the buffer is full."""
-        ...
 
     def adopt(self, peer: Peer) -> None:
         """Send to `peer` from now on."""
-        ...
 
     def wake(self) -> None:
         """Make a `read` of another thread return at once."""
-        ...
 
     def close(self) -> None: ...
 
