@@ -31,10 +31,11 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import advance, begin
-from app.vehicles.mavlink.trial_state import LANDING, Plan, State, Trial
+from app.vehicles.mavlink.trial_state import LANDING, State, Trial
 
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""

@@ -223,7 +223,7 @@ class MavlinkVehicle(VehicleConnection):
     def _keep_landing(self, trial: Trial) -> None:
         """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
         it."""
-        by_hand = trial.watch.modes.find_taken_over(trial.plan.limits) is not None
+        by_hand = trial.watch.modes.find_taken_over(trial.plan) is not None
         is_disarmed = self._radio.is_disarmed or trial.has_confirmed_stop
         if not by_hand and not is_disarmed and self._repeated is None:
             with suppress(LinkError):
