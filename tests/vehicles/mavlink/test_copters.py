@@ -17,7 +17,7 @@ from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, Px4ArmingChec
 from app.autopilots.px4.simulated import Px4
 from app.autopilots.simulated.body import OutgoingMessage
 from app.simdrone import faults
-from app.simdrone.faults import Fault, FaultTarget
+from app.simdrone.fault_kinds import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import STANDSTILL_S, MavlinkVehicle
