@@ -223,10 +223,6 @@ class Autopilot:
         """Return the steps that request telemetry, positions at this rate."""
         return tuple(each.step(target, telemetry_hz) for each in self.telemetry)
 
-    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
-        """Return the steps that request the further telemetry of a flight with several set points."""
-        return tuple(each.step(target) for each in self.set_point_telemetry)
-
     def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
         """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
         None if nothing."""

@@ -5,7 +5,8 @@ import numpy as np
 from app.autopilots.commands import Setting
 from app.vehicles.base import CheckItem, FlightOptions
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import parameters, preflight, preparation
+from app.vehicles.mavlink import parameters, preflight
+from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference
 from app.vehicles.mavlink.ground_observation import Ground
 from app.vehicles.mavlink.parameters import GainStore
@@ -22,8 +23,8 @@ def flies_steps(order: FlightOptions) -> bool:
 def prepare_set_points(radio: AutopilotLink, release: int) -> dict[str, float]:
     """Request the telemetry that a flight with several set points needs, and return the parameters of its loop, which
     the replica would otherwise replace by defaults; `release` is the place of the vehicle's gains among the sets."""
-    preparation.prepare_set_points(radio)
     profile = radio.profile
+    set_up(radio, tuple(each.step(radio.target) for each in profile.set_point_telemetry))
     if not profile.loop_parameters:
         return {}
     return parameters.read_loop(radio, profile.loop_parameters[release], profile.may_lack)

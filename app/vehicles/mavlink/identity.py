@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Final
 
+from app.autopilots.autopilot import AutopilotError
 from app.autopilots.measurements import Heartbeat, Version
 from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import Identity, VehicleError
@@ -132,8 +133,8 @@ class VehicleIdentity:
         the plan's problem, or an empty string."""
         radio, problem = self._radio, ""
         try:
-            radio.target = replace(radio.target, blocks=radio.explore())
-        except VehicleError as error:
+            radio.target = replace(radio.target, blocks=radio.profile.explore(radio.request, radio.target))
+        except (AutopilotError, VehicleError) as error:
             problem = str(error)
         radio.send(*radio.profile.conclude(radio.target))
         self.request()

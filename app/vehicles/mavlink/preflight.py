@@ -25,7 +25,7 @@ from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.boot_clock import unwrapped
 from app.vehicles.mavlink.ground_observation import STANDS_WITHIN_M, GroundObservation, find_reception
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE, reports_armed
+from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE
 from app.vehicles.mavlink.radio import AutopilotLink
 
 POSITIONS_HZ: Final = 40.0
@@ -103,7 +103,7 @@ def evaluate_items(
     items = [
         _heartbeat(radio),
         _single_vehicle(radio),
-        DISARMED.item(not reports_armed(radio), "armed" if reports_armed(radio) else "disarmed", "disarmed"),
+        DISARMED.item(not radio.reports_armed, "armed" if radio.reports_armed else "disarmed", "disarmed"),
         *_motion(watched, find_reception(radio.seen.positions, radio.clock.now_s())),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
@@ -219,7 +219,7 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
 
 def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
     """Return the item of its arming checks; none if it reports nothing of them, by events neither."""
-    if not radio.seen.may_arm and not reports_armed(radio):
+    if not radio.seen.may_arm and not radio.reports_armed:
         _request_checks(radio)
     ready = radio.seen.may_arm
     if ready is None:
