@@ -19,16 +19,13 @@ from app.core.errors import InputError
 from app.live.messages import (
     MAX_LINE_BYTES,
     Abort,
-    AbortAnswer,
+    Answer,
     FromWorker,
-    Message,
     Ping,
-    Pong,
     PublishedMessage,
     Telemetry,
     VehicleCommandKind,
     VehicleOrder,
-    VehicleOrderAnswer,
     VehicleStatus,
     WorkerHello,
     decode,
@@ -119,11 +116,10 @@ class LiveServer:
             writer.close()
 
     def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
-        answer: Message
         match decode(line):
             case Abort(request=request, trial_id=trial_id, reason=reason, by_s=by_s):
                 accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
-                answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
+                answer = Answer(request=request, accepted=accepted)
                 _log.info("abort requested", trial_id=trial_id, reason=reason, accepted=accepted)
             case VehicleOrder() as ordered:
                 task = self._loop.create_task(self._pass_on(ordered, writer))
@@ -131,7 +127,7 @@ class LiveServer:
                 task.add_done_callback(self._orders.discard)
                 return
             case Ping(request=request):
-                answer = Pong(request=request)
+                answer = Answer(request=request)
             case other:
                 raise InputError(
                     f"A client sent {other.type!r}, which only the worker may send.",
@@ -149,10 +145,9 @@ class LiveServer:
             )
             await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
             problem = forwarded.result() if forwarded.done() else UNCONFIRMED
-        vehicle_id, accepted = ordered.vehicle_id, not problem
+        vehicle_id = ordered.vehicle_id
         _log.info("vehicle command", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
-        answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)
-        writer.write(encode(answer))
+        writer.write(encode(Answer(request=ordered.request, accepted=not problem, problem=problem)))
 
     def _send_all(self, message: FromWorker) -> None:
         line = encode(message)
