@@ -27,7 +27,8 @@ from app.flights.abort import AbortRegistry
 from app.flights.connection_process import run_connection_process
 from app.flights.flight_commands import record_abort
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
-from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
+from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection
+from app.flights.vehicle_status import status_time
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError
 from app.vehicles.end_texts import REQUESTED_BY_OPERATOR

@@ -6,7 +6,6 @@ or motors off command outside a flight is repeated until the vehicle obeys, for 
 repeated for 60 s without a packet from the vehicle. Then the process ends; the next worker's connection waits for that.
 """
 
-import datetime as dt
 import itertools
 import os
 import queue
@@ -32,6 +31,7 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
+from app.flights.vehicle_status import status_time
 from app.live.messages import NO_LINK, SILENT_AFTER_S, VehicleCommandKind, VehicleStatus
 from app.vehicles.base import SafeGainsError, VehicleError
 
@@ -185,8 +185,3 @@ class VehicleConnection(FlightProcess):
             self._end_orders()
             with self._sending:
                 self._child.pipe.close()
-
-
-def status_time() -> str:
-    """The present time as a VehicleStatus has it."""
-    return dt.datetime.now(dt.UTC).isoformat()

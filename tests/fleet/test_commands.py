@@ -18,7 +18,8 @@ from app.flights import flight_rows
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
 from app.flights.process_messages import ConnectionOpened
-from app.flights.vehicle_connection import VehicleConnection, status_time
+from app.flights.vehicle_connection import VehicleConnection
+from app.flights.vehicle_status import status_time
 from app.live.messages import VehicleStatus
 from app.main import create_app
 from app.vehicles.base import CheckItem, Identity
