@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.gains import require_accepted
 from app.core.experiments.pitch_tracking import DETAIL_CHANNELS, OUTPUT, WINDOW_S, PitchTracking, named_channels
 from app.core.models.f16 import (
     AMPLITUDE_RAD,
@@ -35,7 +36,7 @@ from app.vehicles.base import (
 )
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options, VehicleKind
-from app.vehicles.simulated import GainHolder, Pacer, accept_gains, end_of
+from app.vehicles.simulated import CANNOT_HOLD, GainHolder, Pacer, end_of
 
 GAIN_NAMES: Final = PitchTracking.space.names
 LOG_NOISE: Final = np.array([3.0, math.radians(0.1), 0.5, math.radians(0.2), math.radians(0.1)])
@@ -142,7 +143,8 @@ def _sample(step: int, row: Samples) -> Sample:
 
 
 def _numbers(gains: Gains) -> dict[str, float]:
-    return accept_gains(gains, GAIN_NAMES, _refusal, kind=float, numbers="finite numbers")
+    require_accepted(gains, dict.fromkeys(GAIN_NAMES, _refusal), CANNOT_HOLD, " as finite numbers")
+    return {name: float(gains[name]) for name in GAIN_NAMES}
 
 
 def _refusal(value: float) -> str | None:

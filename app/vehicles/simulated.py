@@ -3,12 +3,13 @@ disturbances, aborts.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Final, Protocol
 
 import numpy as np
 
+from app.autopilots.gains import require_accepted
 from app.core.clock import REAL_TIME, Clock
 from app.core.control.paparazzi import (
     ALT,
@@ -22,7 +23,7 @@ from app.core.control.paparazzi import (
     THROTTLE,
     fix,
 )
-from app.core.errors import GainsError, InputError, Problem
+from app.core.errors import InputError, Problem
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, shortened
@@ -53,24 +54,7 @@ from app.vehicles.kernels import (
 )
 from app.vehicles.kinds import Options
 
-
-def accept_gains(
-    gains: Gains, names: Sequence[str], refusal: Callable[[float], str | None], *, kind: type[float], numbers: str
-) -> dict[str, float]:
-    """Return the gains, complete and in order, each as `kind`. Raises GainsError naming every unknown or missing gain
-    and each for which `refusal` returns a reason; `numbers` describes the accepted values."""
-    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in names]
-    for name in names:
-        reason = refusal(gains[name]) if name in gains else "is missing"
-        if reason is not None:
-            problems.append(Problem(f"gains.{name}", reason))
-    if problems:
-        raise GainsError(
-            "The vehicle cannot hold these gains.",
-            problems=tuple(problems),
-            hint=f"Send {', '.join(names)} as {numbers}.",
-        )
-    return {name: kind(gains[name]) for name in names}
+CANNOT_HOLD: Final = "The vehicle cannot hold these gains."
 
 
 LISTEN_EVERY_S: Final = 0.02
@@ -331,7 +315,8 @@ def _sample(step: int, row: Rows) -> Sample:
 
 
 def _counts(gains: Gains) -> dict[str, float]:
-    return accept_gains(gains, GAIN_NAMES, _refusal, kind=int, numbers="whole numbers of counts")
+    require_accepted(gains, dict.fromkeys(GAIN_NAMES, _refusal), CANNOT_HOLD, " as whole numbers of counts")
+    return {name: int(gains[name]) for name in GAIN_NAMES}
 
 
 def _refusal(value: float) -> str | None:
