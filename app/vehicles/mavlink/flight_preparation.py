@@ -8,7 +8,7 @@ from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preflight
 from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference
-from app.vehicles.mavlink.ground_observation import Ground
+from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.parameters import GainStore
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink
@@ -59,7 +59,9 @@ def compile_reference(order: FlightOptions, radio: AutopilotLink) -> None:
         reference(order.set_points, np.zeros(1))
 
 
-def plan_of(order: FlightOptions, ground: Ground, radio: AutopilotLink, options: Options, gains: GainStore) -> Plan:
+def plan_of(
+    order: FlightOptions, ground: GroundObservation, radio: AutopilotLink, options: Options, gains: GainStore
+) -> Plan:
     """Return the plan of a flight from there, with the set points of the order."""
     holds = flies_steps(order) and radio.profile.holds_first
     plan = Plan(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from app.autopilots import commands
 from app.autopilots.autopilot import Requirement
 from app.autopilots.measurements import VehicleEvent
 from app.core.control.px4_parameters import HOVER_THRUSTS
@@ -230,10 +231,9 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
 
 def _request_checks(radio: AutopilotLink) -> None:
     """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
-    checks, request = radio.profile.checks, radio.profile.checks_request(radio.target)
-    if checks is not None and request is not None:
+    if (checks := radio.profile.checks) is not None:
         radio.request(
-            request,
+            commands.command(radio.target, checks.command),
             lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
             attempts=_CHECKS_ATTEMPTS,
         )
@@ -253,7 +253,7 @@ def _checks_hint(radio: AutopilotLink) -> str:
     hints = ["Correct what it reports; after power-on, wait until it has settled."]
     if _mode(radio) not in arming_modes and (others := sorted(profile.flying_modes & arming_modes)):
         hints.append(f"It can be armed in mode {' or '.join(profile.mode_names[mode] for mode in others)}.")
-    if profile.checks_request(radio.target) is not None:
+    if profile.checks is not None:
         hints.append("QGroundControl shows the reasons in full.")
     return " ".join(hints)
 
@@ -297,7 +297,7 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
     """Check that the flight plan was heard to set the ground reference, if it can, and that the vehicle stands by it:
     a takeoff's altitude counts from there, and so does its error."""
     is_set = radio.seen.has_ground_reference or not radio.profile.refer_to_ground(radio.target)
-    found = f"it stands at {watched.ground.altitude_m:.2f} m" if watched.positions else "waiting for a position"
+    found = f"it stands at {watched.altitude_m:.2f} m" if watched.positions else "waiting for a position"
     if not is_set:
         mode = radio.profile.mode_names.get(_mode(radio), _mode(radio))
         found = f"not set by the flight plan (mode {mode}, block {radio.block or 'not reported'})"
