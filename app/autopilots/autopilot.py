@@ -238,14 +238,6 @@ class Autopilot:
         """Return the messages that it must receive all the time while it follows set points."""
         return (commands.position_target(target),) if self.needs_stream else ()
 
-    def version_request(self, target: Target) -> Outgoing | None:
-        """Return the request for its version, if it replies to that."""
-        return commands.request_version(target) if self.reports_version else None
-
-    def checks_request(self, target: Target) -> Outgoing | None:
-        """Return the request to run its arming checks, if it supports that."""
-        return None if self.checks is None else commands.command(target, self.checks.command)
-
     def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
         """Return the message that sets a floating-point parameter, the type of all gains."""
         return commands.set_parameter(target, parameter, value, component=self.parameter_component)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Final
 
+from app.autopilots import commands
 from app.autopilots.autopilot import AutopilotError
 from app.autopilots.measurements import Heartbeat, Version
 from app.autopilots.registry import AUTOPILOTS
@@ -80,9 +81,10 @@ class VehicleIdentity:
         s."""
         radio = self._radio
         radio.receive_pending()
-        request, is_needed = radio.profile.version_request(radio.target), bool(self.missing_uid)
-        if request is not None and (is_needed or not (radio.seen.version or radio.seen.uid)):
+        is_needed = bool(self.missing_uid)
+        if radio.profile.reports_version and (is_needed or not (radio.seen.version or radio.seen.uid)):
             attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS
+            request = commands.request_version(radio.target)
             radio.request(request, lambda reply: isinstance(reply, Version), attempts=attempts)
 
     def await_vehicle(self, address: str) -> None:
