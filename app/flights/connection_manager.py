@@ -51,10 +51,6 @@ class VehicleSlot:
     restarts: int | None = None
     """Restarts of the vehicle that its connection has reported; None before its first status."""
 
-    @property
-    def live(self) -> VehicleConnection | None:
-        return self.session if self.session is not None and self.session.alive else None
-
 
 class VehicleConnectionManager:
     """Claims and carries out acts, and owns the connections.
@@ -104,8 +100,7 @@ class VehicleConnectionManager:
 
         A flight that waits for its takeoff stands down as well.
         """
-        slot = self._slots.get(vehicle_id)
-        if slot is None or (session := slot.live) is None:
+        if (session := self._live(vehicle_id)) is None:
             return _refused(NO_LINK)
         answer = session.send_command(order, words, by_s)
         if (trial_id := session.trial_id) is not None:
@@ -122,8 +117,7 @@ class VehicleConnectionManager:
 
     def session(self, vehicle_id: int) -> VehicleConnection:
         """The vehicle's connection, for a flight. Raises VehicleError when there is none."""
-        slot = self._slots.get(vehicle_id)
-        if slot is None or (session := slot.live) is None:
+        if (session := self._live(vehicle_id)) is None:
             raise _no_link_error()
         return session
 
@@ -283,6 +277,11 @@ class VehicleConnectionManager:
         slot.concern, slot.session = opened.concern, session
         _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(opened.identity), concern=opened.concern)
         return opened
+
+    def _live(self, vehicle_id: int) -> VehicleConnection | None:
+        slot = self._slots.get(vehicle_id)
+        session = None if slot is None else slot.session
+        return session if session is not None and session.alive else None
 
     def _slot(self, vehicle_id: int) -> VehicleSlot:
         return self._slots.setdefault(vehicle_id, VehicleSlot())
