@@ -7,7 +7,16 @@ from typing import Final
 
 from app.autopilots.dialects import PAPARAZZI
 from app.autopilots.paparazzi.simulated_estimator import FallEstimator
-from app.autopilots.simulated.body import ARMED, Body, Fields, SimulatedAutopilot, whole_ticks
+from app.autopilots.simulated.body import (
+    ARMED,
+    Body,
+    Fields,
+    SimulatedAutopilot,
+    attitude,
+    system_time,
+    version,
+    whole_ticks,
+)
 from app.autopilots.simulated.copter_parameters import Parameters
 from app.core.control.paparazzi import POSITION_BITS, SPEED_BITS, fix
 
@@ -188,31 +197,14 @@ def battery_status(now: ReportingPaparazzi) -> Fields:
     }
 
 
-def attitude(now: ReportingPaparazzi) -> Fields:
-    return {"time_boot_ms": now.boot_ms, "roll": 0.0, "pitch": 0.0, "yaw": 0.0, **_RATES}
-
-
 def attitude_quaternion(now: ReportingPaparazzi) -> Fields:
-    return {"time_boot_ms": now.boot_ms, "q1": 1.0, "q2": 0.0, "q3": 0.0, "q4": 0.0, **_RATES}
-
-
-def system_time(now: ReportingPaparazzi) -> Fields:
-    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
+    still = dict.fromkeys(("q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
+    return {"time_boot_ms": now.boot_ms, "q1": 1.0, **still}
 
 
 def global_origin(now: ReportingPaparazzi) -> Fields:
     return {"latitude": _LATITUDE_E7, "longitude": _LONGITUDE_E7, "altitude": now.origin_mm}
 
-
-def version(_now: ReportingPaparazzi) -> Fields:
-    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
-    numbers = dict.fromkeys(
-        ("capabilities", "middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id", "uid"), 0
-    )
-    return {"flight_sw_version": 51000, **numbers, **custom}
-
-
-_RATES: Final = {"rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
 
 MESSAGES: Final[Mapping[str, Callable[[ReportingPaparazzi], Fields]]] = MappingProxyType(
     {
@@ -226,7 +218,7 @@ MESSAGES: Final[Mapping[str, Callable[[ReportingPaparazzi], Fields]]] = MappingP
         "SYSTEM_TIME": system_time,
         "BATTERY_STATUS": battery_status,
         "GPS_GLOBAL_ORIGIN": global_origin,
-        "AUTOPILOT_VERSION": version,
+        "AUTOPILOT_VERSION": lambda _now: version(51000),
     }
 )
 

@@ -249,6 +249,23 @@ class SimulatedAutopilot(ABC):
             self.send_parameter(place)
 
 
+def attitude(now: SimulatedAutopilot) -> Fields:
+    """Return ATTITUDE, which is level."""
+    still = dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
+    return {"time_boot_ms": now.boot_ms, **still}
+
+
+def system_time(now: SimulatedAutopilot) -> Fields:
+    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
+
+
+def version(flight_software: int, *, capabilities: int = 0, uid: int = 0) -> Fields:
+    """Return AUTOPILOT_VERSION."""
+    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
+    others = dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0)
+    return {"capabilities": capabilities, "flight_sw_version": flight_software, "uid": uid, **others, **custom}
+
+
 def sender(message: Message) -> dict[str, int]:
     """Return the target of a reply."""
     return {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}

@@ -17,7 +17,7 @@ from app.autopilots.simulated.body import (
 )
 from app.autopilots.simulated.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
 from app.autopilots.simulated.copter_parameters import Behaviour, FlightMode, Reaction
-from app.autopilots.simulated.copter_telemetry import KINDS_BY_NUMBER, REPORTS, ReportingCopter
+from app.autopilots.simulated.copter_telemetry import REPORTS, ReportingCopter
 
 FORCE: Final = 21196
 """Second parameter of command 400 that makes it unconditional."""
@@ -221,7 +221,7 @@ class Copter(ReportingCopter):
 
     def send(self, kind: str) -> None:
         """Send one of the reports now."""
-        self._send(kind, REPORTS[kind].fields(self))
+        self._send(kind, REPORTS[kind](self))
 
     def _can_send(self, kind: str) -> bool:
         if kind in _ESTIMATED:
@@ -336,8 +336,8 @@ class Copter(ReportingCopter):
 
     def _requested(self, message: Message) -> str | None:
         """Return the message that a command is about, or None if this autopilot lacks it."""
-        kind = KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
-        return None if kind in self.firmware.lacks else kind
+        kind = self.dialect.name_of(_whole(number(message, "param1")))
+        return kind if kind in REPORTS and kind not in self.firmware.lacks else None
 
     def _handle_checks(self, _message: Message) -> int:
         if self.armed:

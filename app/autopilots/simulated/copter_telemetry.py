@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar, Final
 
-from app.autopilots.simulated.body import ARMED, Body, Fields, SimulatedAutopilot
+from app.autopilots.simulated.body import ARMED, Body, Fields, SimulatedAutopilot, attitude, system_time, version
 from app.autopilots.simulated.copter_control import (
     IGNORE_AZ,
     IGNORE_VZ,
@@ -117,10 +116,6 @@ def global_position(now: ReportingCopter) -> Fields:
     }
 
 
-def attitude(now: ReportingCopter) -> Fields:
-    return {"time_boot_ms": now.boot_ms, **dict.fromkeys(_ATTITUDE, 0.0)}
-
-
 def position_target(now: ReportingCopter) -> Fields:
     """Return POSITION_TARGET_LOCAL_NED: the set point in force, not the shaped one."""
     given = now.controller.set_point
@@ -210,10 +205,6 @@ def home_position(_now: ReportingCopter) -> Fields:
     return {**place, **zeros, "q": [1.0, 0.0, 0.0, 0.0]}
 
 
-def system_time(now: ReportingCopter) -> Fields:
-    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
-
-
 def extended_state(now: ReportingCopter) -> Fields:
     return {"vtol_state": 0, "landed_state": _LANDED_STATES[now.controller.phase]}
 
@@ -229,46 +220,26 @@ def fence_status(now: ReportingCopter) -> Fields:
 
 def autopilot_version(now: ReportingCopter) -> Fields:
     """Return AUTOPILOT_VERSION, with only the implemented capabilities: MAVLink 2 and parameters as floats."""
-    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
-    numbers = dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0)
-    return {
-        "capabilities": 2 | (1 << 13),
-        "flight_sw_version": now.firmware.version,
-        **numbers,
-        "uid": now.uid,
-        **custom,
-    }
+    return version(now.firmware.version, capabilities=2 | (1 << 13), uid=now.uid)
 
 
-_ATTITUDE: Final = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """A message's number, and the function of its fields."""
-
-    number: int
-    fields: Callable[[ReportingCopter], Fields]
-
-
-REPORTS: Final[Mapping[str, Report]] = MappingProxyType(
+REPORTS: Final[Mapping[str, Callable[[ReportingCopter], Fields]]] = MappingProxyType(
     {
-        "HEARTBEAT": Report(0, heartbeat),
-        "SYS_STATUS": Report(1, sys_status),
-        "SYSTEM_TIME": Report(2, system_time),
-        "GPS_RAW_INT": Report(24, gps_raw),
-        "ATTITUDE": Report(30, attitude),
-        "LOCAL_POSITION_NED": Report(32, local_position),
-        "GLOBAL_POSITION_INT": Report(33, global_position),
-        "NAV_CONTROLLER_OUTPUT": Report(62, controller_output),
-        "VFR_HUD": Report(74, vfr_hud),
-        "ATTITUDE_TARGET": Report(83, attitude_target),
-        "POSITION_TARGET_LOCAL_NED": Report(85, position_target),
-        "BATTERY_STATUS": Report(147, battery_status),
-        "AUTOPILOT_VERSION": Report(148, autopilot_version),
-        "FENCE_STATUS": Report(162, fence_status),
-        "HOME_POSITION": Report(242, home_position),
-        "EXTENDED_SYS_STATE": Report(245, extended_state),
+        "HEARTBEAT": heartbeat,
+        "SYS_STATUS": sys_status,
+        "SYSTEM_TIME": system_time,
+        "GPS_RAW_INT": gps_raw,
+        "ATTITUDE": attitude,
+        "LOCAL_POSITION_NED": local_position,
+        "GLOBAL_POSITION_INT": global_position,
+        "NAV_CONTROLLER_OUTPUT": controller_output,
+        "VFR_HUD": vfr_hud,
+        "ATTITUDE_TARGET": attitude_target,
+        "POSITION_TARGET_LOCAL_NED": position_target,
+        "BATTERY_STATUS": battery_status,
+        "AUTOPILOT_VERSION": autopilot_version,
+        "FENCE_STATUS": fence_status,
+        "HOME_POSITION": home_position,
+        "EXTENDED_SYS_STATE": extended_state,
     }
 )
-KINDS_BY_NUMBER: Final[Mapping[int, str]] = MappingProxyType({report.number: kind for kind, report in REPORTS.items()})
