@@ -26,22 +26,6 @@ Ending = Literal["completed", "aborted", "invalid"]
 
 
 @dataclass(frozen=True, slots=True)
-class VehicleOption:
-    """One setting of a vehicle kind, with its unit, range or choices, and default. `label`: the title without the help
-    for entering a value, empty if it contains none. `autopilots`: those that have it, empty for all."""
-
-    name: str
-    title: str
-    unit: str
-    default: OptionValue
-    lower: float | None = None
-    upper: float | None = None
-    choices: tuple[OptionValue, ...] = ()
-    label: str = ""
-    autopilots: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Sample:
     """Telemetry at one instant: seconds since the takeoff command, and the record's channels for live display,
     including the scored one."""

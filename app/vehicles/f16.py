@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.gains import require_accepted
+from app.core.definition import Option
 from app.core.experiments.pitch_tracking import DETAIL_CHANNELS, OUTPUT, WINDOW_S, PitchTracking, named_channels
 from app.core.models.f16 import (
     AMPLITUDE_RAD,
@@ -25,7 +26,7 @@ from app.core.models.f16 import (
 )
 from app.core.policy import Gains, is_finite, shortened
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.base import FlightOptions, OptionValue, Sample, ShouldStop, Vehicle, VehicleOption
+from app.vehicles.base import FlightOptions, OptionValue, Sample, ShouldStop, Vehicle
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options, VehicleKind
 from app.vehicles.simulated import CANNOT_HOLD, Pacer, StagedVehicle
@@ -145,11 +146,11 @@ LTI: Final = VehicleKind(
     can_fly=True,
     experiments=("pitch-tracking",),
     options=(
-        VehicleOption(
+        Option(
             "log_noise",
             "Noise of the recorded states, as a multiple of 3 ft, 0.1°, 0.5 ft/s, 0.2°, 0.1 °/s at 50 Hz",
-            "×",
             0.0,
+            "×",
             0.0,
             10.0,
         ),
