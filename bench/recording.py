@@ -33,9 +33,9 @@ from app.simdrone.drone import Drone, Server
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.ground_observation import Ground
+from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
-from app.vehicles.mavlink.trial import TrialResult
+from app.vehicles.mavlink.trial import TrialRunner
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from bench.timing.machine import slowness
@@ -119,7 +119,7 @@ class LongRecord(MavlinkVehicle):
 
     kept_ms: tuple[int, ...] = ()
 
-    def _record(self, flown: TrialResult, ground: Ground) -> FlightRecord:
+    def _record(self, flown: TrialRunner, ground: GroundObservation) -> FlightRecord:
         self.kept_ms = tuple(round(kept.position.time_boot_s * 1000.0) for kept in flown.samples)
         return super()._record(flown, ground)
 

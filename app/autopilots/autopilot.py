@@ -234,10 +234,6 @@ class Autopilot:
         """Return the steps that request telemetry, positions at this rate."""
         return tuple(each.step(target, telemetry_hz) for each in self.telemetry)
 
-    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
-        """Return the steps that request the further telemetry of a flight with several set points."""
-        return tuple(each.step(target) for each in self.set_point_telemetry)
-
     def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
         """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
         None if nothing."""
@@ -252,14 +248,6 @@ class Autopilot:
     def stream(self, target: Target) -> tuple[Outgoing, ...]:
         """Return the messages that it must receive all the time while it follows set points."""
         return (commands.position_target(target),) if self.needs_stream else ()
-
-    def version_request(self, target: Target) -> Outgoing | None:
-        """Return the request for its version, if it replies to that."""
-        return commands.request_version(target) if self.reports_version else None
-
-    def checks_request(self, target: Target) -> Outgoing | None:
-        """Return the request to run its arming checks, if it supports that."""
-        return None if self.checks is None else commands.command(target, self.checks.command)
 
     def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
         """Return the message that sets a floating-point parameter, the type of all gains."""

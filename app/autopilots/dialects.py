@@ -104,6 +104,10 @@ class Dialect:
     def can_sign(self) -> bool:
         return self.mavlink >= 2
 
+    def name_of(self, number: int) -> str:
+        """Return the name of the message with this number; empty if the dialect has none."""
+        return getattr(self.library.mavlink_map.get(number), "msgname", "")
+
     def message(self, kind: str, fields: Mapping[str, FieldValue]) -> Message:
         """Return a message ready to be packed; `kind` is its name ("PARAM_SET"), text fields are str or bytes.
 

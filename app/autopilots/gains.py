@@ -2,7 +2,7 @@
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -69,19 +69,23 @@ def on_board(gains: Sequence[Gain], *, integrating: str, names: Mapping[str, tup
 def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
     """Return the gains, complete and in order. Raises GainsError for those that may not be written, because autopilots
     do not check."""
-    known = {gain.gain: gain for gain in gain_set}
-    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in known]
-    for name, gain in known.items():
-        reason = gain.refusal(gains[name]) if name in gains else "is missing"
+    refusals = {gain.gain: gain.refusal for gain in gain_set}
+    require_accepted(gains, refusals, "These gains may not be written to the vehicle.", ", each within its range")
+    return {gain.gain: int(gains[gain.gain]) if gain.whole else float(gains[gain.gain]) for gain in gain_set}
+
+
+def require_accepted(
+    gains: Gains, refusals: Mapping[str, Callable[[float], str | None]], happened: str, needed: str
+) -> None:
+    """Raise GainsError that names every unknown or missing gain, and each whose value has a refusal by its name;
+    `needed` ends the sentence that asks for accepted values."""
+    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in refusals]
+    for name, refusal in refusals.items():
+        reason = refusal(gains[name]) if name in gains else "is missing"
         if reason is not None:
             problems.append(Problem(f"gains.{name}", reason))
     if problems:
-        raise GainsError(
-            "These gains may not be written to the vehicle.",
-            problems=tuple(problems),
-            hint=f"Send {', '.join(known)}, each within its range.",
-        )
-    return {name: int(gains[name]) if gain.whole else float(gains[name]) for name, gain in known.items()}
+        raise GainsError(happened, problems=tuple(problems), hint=f"Send {', '.join(refusals)}{needed}.")
 
 
 def _single(value: float) -> float:

@@ -23,7 +23,6 @@ from app.core.statistics.comparisons import Group, PooledScatter, groups_of, poo
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
-from app.vehicles.base import VehicleOption
 from app.vehicles.registry import VEHICLE_KINDS
 
 
@@ -239,9 +238,7 @@ def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference
     )
 
 
-def _options(
-    values: Mapping[str, OptionValue], known: Iterable[Option] | Iterable[VehicleOption]
-) -> list[FlightSetting]:
+def _options(values: Mapping[str, OptionValue], known: Iterable[Option]) -> list[FlightSetting]:
     described = {option.name: option for option in known}
     return [
         FlightSetting(

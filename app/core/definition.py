@@ -142,17 +142,21 @@ def flight_seed(seed: int, number: int) -> int:
     return int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Option:
-    """One setting: one of `choices`, or any number of the default's type within `lower` … `upper`."""
+    """One setting: one of `choices`, or any number of the default's type within `lower` … `upper`. `label`: the title
+    without the help for entering a value, empty if it contains none. `autopilots`: those whose vehicles have it, empty
+    for all."""
 
     name: str
     title: str
     default: OptionValue
-    choices: tuple[OptionValue, ...] = ()
     unit: str = ""
     lower: float | None = None
     upper: float | None = None
+    choices: tuple[OptionValue, ...] = ()
+    label: str = ""
+    autopilots: tuple[str, ...] = ()
 
     def refusal(self, value: OptionValue) -> str | None:
         """Why `value` is not allowed, or None if it is."""

@@ -9,7 +9,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Final, TypeVar
 
 import structlog
@@ -18,16 +17,15 @@ from sqlalchemy.orm import Session as Transaction
 from app.common.errors import ConflictError, StorageError
 from app.common.logging import say
 from app.common.states import GIVES_GAINS, ActKind
-from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
-from app.db.session import Database, retry_until_stored
 from app.fleet import commands
 from app.fleet.commands import ActTask
-from app.flights.abort import AbortRegistry
 from app.flights.connection_process import run_connection_process
 from app.flights.flight_commands import record_abort
-from app.flights.flight_process import RECONNECT_INTERVAL_S, VehicleConnection, status_time
-from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
+from app.flights.flight_process import RECONNECT_INTERVAL_S, VehicleConnection
+from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleResponse
+from app.flights.vehicle_status import status_time
+from app.flights.worker_part import WorkerPart
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError
 from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
@@ -53,38 +51,16 @@ class VehicleSlot:
     restarts: int | None = None
     """Restarts of the vehicle that its connection has reported; None before its first status."""
 
-    @property
-    def live(self) -> VehicleConnection | None:
-        return self.session if self.session is not None and self.session.alive else None
-
 
 class VehicleConnectionManager:
     """Claims and carries out acts, and owns the connections.
 
-    `closing` ends the retries while the database accepts no writes. `order` and `session` may be called from any
-    thread. Without `links`, no vehicle is reconnected automatically.
+    `order` and `session` may be called from any thread. Without `links`, no vehicle is reconnected automatically.
     """
 
-    def __init__(
-        self,
-        database: Database,
-        data_dir: Path,
-        abort_registry: AbortRegistry,
-        publish: Publish,
-        *,
-        worker: str,
-        closing: threading.Event,
-        links: bool = True,
-        clock: Clock = REAL_TIME,
-    ) -> None:
-        self._database = database
-        self._data_dir = data_dir
-        self._abort_registry = abort_registry
-        self._publish = publish
-        self._worker = worker
-        self._closing = closing
+    def __init__(self, part: WorkerPart, *, links: bool = True) -> None:
+        self._part = part
         self._links = links
-        self._clock = clock
         self._slots: dict[int, VehicleSlot] = {}
         self._look_due_s = 0.0
         self._reconnect_executor = ThreadPoolExecutor(MAX_CONCURRENT, thread_name_prefix="link")
@@ -95,7 +71,7 @@ class VehicleConnectionManager:
 
         Raises StorageError.
         """
-        with self._database.write() as transaction:
+        with self._part.database.write() as transaction:
             commands.withdraw_acts(transaction)
             commands.forget_connections(transaction)
             wanted = commands.request_reconnections(transaction) if self._links else []
@@ -124,26 +100,24 @@ class VehicleConnectionManager:
 
         A flight that waits for its takeoff stands down as well.
         """
-        slot = self._slots.get(vehicle_id)
-        if slot is None or (session := slot.live) is None:
+        if (session := self._live(vehicle_id)) is None:
             return _refused(NO_LINK)
         answer = session.send_command(order, words, by_s)
         if (trial_id := session.trial_id) is not None:
-            self._abort_registry.abort(trial_id, StopRequest(words))
+            self._part.abort_registry.abort(trial_id, StopRequest(words))
         return answer
 
     def abort(self, trial_id: int, words: str) -> bool:
         """Abort the trial's flight, then record that. Returns whether that trial is being flown here."""
         request = StopRequest(words)
-        accepted = self._abort_registry.abort(trial_id, request)
+        accepted = self._part.abort_registry.abort(trial_id, request)
         if accepted:
             self._record_in_background(lambda t: record_abort(t, trial_id, request))
         return accepted
 
     def session(self, vehicle_id: int) -> VehicleConnection:
         """The vehicle's connection, for a flight. Raises VehicleError when there is none."""
-        slot = self._slots.get(vehicle_id)
-        if slot is None or (session := slot.live) is None:
+        if (session := self._live(vehicle_id)) is None:
             raise _no_link_error()
         return session
 
@@ -151,8 +125,7 @@ class VehicleConnectionManager:
 
     def claim(self) -> ActTask | None:
         """Claim the oldest requested act for this worker; None when there is none. Raises StorageError."""
-        with self._database.write() as transaction:
-            return commands.claim_act(transaction, self._worker)
+        return self._part.store(lambda t: commands.claim_act(t, self._part.worker))
 
     def carry_out(self, task: ActTask) -> None:
         """Carry out an act and store its outcome. Raises nothing."""
@@ -201,7 +174,7 @@ class VehicleConnectionManager:
 
     def _acquire_slot(self, slot: VehicleSlot) -> None:
         """Acquire the slot for an act; closes a connection attempt that is holding it."""
-        while not slot.busy.acquire(timeout=self._clock.wall_s(YIELD_POLL_S)):
+        while not slot.busy.acquire(timeout=self._part.clock.wall_s(YIELD_POLL_S)):
             if (seeking := slot.reconnecting) is not None:
                 seeking.request_close()
 
@@ -233,18 +206,17 @@ class VehicleConnectionManager:
         for vehicle_id, slot in tuple(self._slots.items()):
             if (session := slot.session) is not None and not session.alive:
                 self._release_ended(vehicle_id, slot, session)
-        if not self._links or self._clock.now_s() < self._look_due_s:
+        if not self._links or self._part.clock.now_s() < self._look_due_s:
             return
-        self._look_due_s = self._clock.now_s() + RECONNECT_INTERVAL_S
-        with self._database.read() as transaction:
+        self._look_due_s = self._part.clock.now_s() + RECONNECT_INTERVAL_S
+        with self._part.database.read() as transaction:
             wanted = commands.list_vehicles_to_reconnect(transaction)
         for vehicle in wanted:
             self._schedule_reconnect(vehicle)
 
     def _release_ended(self, vehicle_id: int, slot: VehicleSlot, gone: VehicleConnection) -> None:
         try:
-            with self._database.write() as transaction:
-                commands.record_disconnected(transaction, vehicle_id)
+            self._part.store(lambda t: commands.record_disconnected(t, vehicle_id))
         except ConflictError:
             return  # the database still has its flight: try again later
         _log.warning("vehicle connection ended unexpectedly", vehicle_id=vehicle_id)
@@ -286,12 +258,14 @@ class VehicleConnectionManager:
             slot.session.close()
         slot.restarts = None
         self._publish_state(vehicle_id, "connecting")
-        call = ConnectionRequest(vehicle=vehicle, data_dir=self._data_dir, keep_retrying=patient, clock=self._clock)
+        call = ConnectionRequest(
+            vehicle=vehicle, data_dir=self._part.data_dir, keep_retrying=patient, clock=self._part.clock
+        )
         session = slot.reconnecting = VehicleConnection(
             call, run_connection_process, hear=partial(self._on_message, slot, vehicle_id)
         )
         try:
-            if self._closing.is_set():
+            if self._part.closing.is_set():
                 raise _no_link_error()
             opened = session.wait_until_open()
         except BaseException:
@@ -304,6 +278,11 @@ class VehicleConnectionManager:
         _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(opened.identity), concern=opened.concern)
         return opened
 
+    def _live(self, vehicle_id: int) -> VehicleConnection | None:
+        slot = self._slots.get(vehicle_id)
+        session = None if slot is None else slot.session
+        return session if session is not None and session.alive else None
+
     def _slot(self, vehicle_id: int) -> VehicleSlot:
         return self._slots.setdefault(vehicle_id, VehicleSlot())
 
@@ -313,7 +292,7 @@ class VehicleConnectionManager:
         """Handle a message, on the connection's own thread."""
         match news:
             case VehicleStatus(concern=concern, restarts=restarts):
-                self._publish(news)
+                self._part.publish(news)
                 if slot.restarts is not None and restarts > slot.restarts:
                     self._record_in_background(lambda t: commands.discard_checks(t, vehicle_id))
                 slot.restarts = restarts
@@ -328,7 +307,7 @@ class VehicleConnectionManager:
                 )
 
     def _publish_state(self, vehicle_id: int, state: VehicleLinkState) -> None:
-        self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=status_time(), step=""))
+        self._part.publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=status_time(), step=""))
 
     # ---- database
 
@@ -341,15 +320,11 @@ class VehicleConnectionManager:
         """Result of `work`, retried until the database accepts it; None if the database refuses it or the worker
         closes."""
 
-        def store() -> T:
-            with self._database.write() as transaction:
-                return work(transaction)
-
         def refused(error: StorageError) -> None:
             _log.error("vehicle state not stored yet", why=str(error))
 
         try:
-            return retry_until_stored(store, refused, closing=self._closing, clock=self._clock)
+            return self._part.store_with_retry(work, refused)
         except GainlineError as error:
             _log.error("vehicle state conflicts with the database", why=str(error))
             return None

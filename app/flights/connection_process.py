@@ -8,9 +8,9 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection
-from typing import Final, Literal
+from typing import Final
 
 from app.common.data_folder import telemetry_log, trial_parameters_folder, vehicle_lock
 from app.common.states import ActKind
@@ -23,7 +23,7 @@ from app.flights.flight_loop import (
     hold_vehicle_lock,
     internal_error,
 )
-from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
+from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S
 from app.flights.process_messages import (
     CommandForwarded,
     ConnectionOpened,
@@ -37,10 +37,10 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
-from app.live.messages import SILENT_AFTER_S, UnreadyReason, VehicleStatus
+from app.flights.vehicle_status import Staging, is_silent, status_of
+from app.live.messages import SILENT_AFTER_S, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
-    Condition,
     ConnectedVehicle,
     FlightRecord,
     InterruptedByOrderError,
@@ -52,9 +52,6 @@ from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import get_kind, restore_safe_gains
 
-Staging = Literal["none", "staged", "silent", "lost"]
-"""Of the flight that waits for its takeoff: nothing staged, the staged gains read back, a silence since then, or the
-gains no longer on the vehicle."""
 _NOT_READY: Final[Mapping[Staging, str]] = {
     "silent": f"nothing was received from the vehicle for {SILENT_AFTER_S:g} s",
     "lost": "the staged gains are no longer on the vehicle",
@@ -62,8 +59,6 @@ _NOT_READY: Final[Mapping[Staging, str]] = {
 
 POLL_INTERVAL_S: Final = 0.005
 STATUS_INTERVAL_S: Final = 0.2
-LOST_AFTER_S: Final = 3.0
-"""A vehicle without a heartbeat for this long is shown as gone."""
 LOCK_TIMEOUT_S: Final = 120.0
 """How long the process waits for that of a killed worker, which may be landing or waiting for a lost link."""
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
@@ -187,7 +182,7 @@ class VehicleProcess(FlightLoop):
     def _watch_staged(self, status: VehicleStatus) -> None:
         """After a silence, a restart or a gap in its positions, read the staged gains again; tell the worker if they
         are lost."""
-        if self._is_silent(status):
+        if is_silent(status):
             self._staging = "silent"
         elif self._staging == "silent" or not status.held or not status.position_hz:
             try:
@@ -197,9 +192,6 @@ class VehicleProcess(FlightLoop):
             except VehicleError as error:
                 self._staging = "lost"
                 self._line.send(StagingLost(str(error)))
-
-    def _is_silent(self, status: Condition) -> bool:
-        return status.packet_age_s is None or status.packet_age_s > SILENT_AFTER_S
 
     def _poll_commands(self) -> ToVehicleProcess | None:
         """Forward a command at once; return any other message."""
@@ -271,38 +263,9 @@ class VehicleProcess(FlightLoop):
             return None
         self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
         self._report_stops()
-        status = self._status()
+        status = status_of(self._call.vehicle.vehicle_id, self._vehicle, self._staging, speed=self._speed)
         self._line.send_if_ready(status)
         return status
-
-    def _condition(self) -> Condition:
-        """The vehicle's condition, its ages in the time of the ground."""
-        known = self._vehicle.condition()
-        return replace(
-            known,
-            packet_age_s=_in_ground_time(known.packet_age_s, self._speed),
-            heartbeat_age_s=_in_ground_time(known.heartbeat_age_s, self._speed),
-            said_age_s=_in_ground_time(known.said_age_s, self._speed),
-        )
-
-    def _status(self) -> VehicleStatus:
-        condition = self._condition()
-        known = {each.name: getattr(condition, each.name) for each in fields(condition)}
-        age_s = condition.heartbeat_age_s
-        return VehicleStatus(
-            vehicle_id=self._call.vehicle.vehicle_id,
-            state="gone" if age_s is None or age_s > LOST_AFTER_S else "connected",
-            at=status_time(),
-            concern=self._vehicle.concern,
-            unready=self._unready(condition),
-            **known | {"held": dict(condition.held)},
-        )
-
-    def _unready(self, condition: Condition) -> UnreadyReason:
-        is_blind = self._staging == "staged" and not condition.position_hz
-        if self._staging == "silent" or is_blind or self._is_silent(condition):
-            return "link silent"
-        return "gains unknown" if self._staging == "lost" or not condition.held else ""
 
     def _held(self) -> dict[str, float]:
         return dict(self._vehicle.condition().held)
@@ -401,11 +364,6 @@ class VehicleProcess(FlightLoop):
                 self._report(message)
             case _:
                 super()._note(message)
-
-
-def _in_ground_time(age_s: float | None, speed: float) -> float | None:
-    """An age by the vehicle's clock, which runs at this speed, in the time of the ground."""
-    return None if age_s is None else age_s / speed
 
 
 def _has_expired(ordered: VehicleCommand) -> bool:

@@ -8,7 +8,6 @@ if it was already repeated for 60 s without a packet from the vehicle. Then the 
 connection waits for that.
 """
 
-import datetime as dt
 import itertools
 import math
 import os
@@ -47,6 +46,7 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
+from app.flights.vehicle_status import status_time
 from app.live.messages import NO_LINK, SILENT_AFTER_S, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
 from app.vehicles.base import SafeGainsError, VehicleError
@@ -303,11 +303,6 @@ class VehicleConnection(FlightProcess):
             self._end_orders()
             with self._sending:
                 self._child.pipe.close()
-
-
-def status_time() -> str:
-    """The present time as a VehicleStatus has it."""
-    return dt.datetime.now(dt.UTC).isoformat()
 
 
 def process_died_error(exit_code: int | None) -> VehicleError:

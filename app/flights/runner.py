@@ -4,11 +4,9 @@ A request is stored before it is sent, its outcome when it is known. Nothing wai
 landing; a record goes to the spool first, and from there into the database.
 """
 
-import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 import structlog
@@ -16,10 +14,9 @@ from sqlalchemy.orm import Session
 
 from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
-from app.core.clock import REAL_TIME, Clock
-from app.db.session import RETRY_S, Database, retry_until_stored
+from app.db.session import RETRY_S
 from app.flights import flight_rows
-from app.flights.abort import AbortFlag, AbortRegistry
+from app.flights.abort import AbortFlag
 from app.flights.flight_process import FlightProcess, FlightProcessPool, VehicleConnection
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
@@ -27,10 +24,10 @@ from app.flights.process_messages import (
     FlightLanded,
     FlightRequest,
     GainsStaged,
-    Publish,
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
+from app.flights.worker_part import WorkerPart
 from app.live.messages import FlightPhase, Phase
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.end_texts import end_text
@@ -48,34 +45,17 @@ def _refuse_session(_vehicle_id: int) -> FlightProcess:
 
 
 class FlightRunner:
-    """Claims flights and carries them out. `closing` ends the retries while the database accepts no writes.
+    """Claims flights and carries them out.
 
     `session(vehicle_id)` returns the process of a vehicle that keeps its connection between flights; other vehicles are
     opened for each flight in a process of the pool.
     """
 
-    def __init__(
-        self,
-        database: Database,
-        data_dir: Path,
-        abort_registry: AbortRegistry,
-        publish: Publish,
-        *,
-        worker: str,
-        closing: threading.Event,
-        session: Callable[[int], FlightProcess] = _refuse_session,
-        clock: Clock = REAL_TIME,
-    ) -> None:
-        self._database = database
-        self._data_dir = data_dir
+    def __init__(self, part: WorkerPart, *, session: Callable[[int], FlightProcess] = _refuse_session) -> None:
+        self._part = part
         self._session = session
-        self._spool = Spool(data_dir / "spool")
-        self._abort_registry = abort_registry
-        self._publish = publish
-        self._worker = worker
-        self._closing = closing
-        self._clock = clock
-        self._process_pool = FlightProcessPool(data_dir, clock)
+        self._spool = Spool(part.data_dir / "spool")
+        self._process_pool = FlightProcessPool(part.data_dir, part.clock)
 
     def close(self) -> None:
         """Close the process pool. Call it only when nothing flies."""
@@ -87,7 +67,7 @@ class FlightRunner:
         Flights that were running are lost unless their record is in the spool; requests from the time without a worker
         are withdrawn. Raises StorageError.
         """
-        with self._database.write() as session:
+        with self._part.database.write() as session:
             for flight_id in flight_rows.withdraw_requested_flights(
                 session, "no worker was running when it was requested"
             ):
@@ -101,12 +81,12 @@ class FlightRunner:
     def claim(self) -> FlightRequest | None:
         """Claim the oldest requested flight for this worker; None when there is none. Raises StorageError."""
         with ExitStack() as undo:
-            with self._database.write() as session:
-                if (request := flight_rows.claim_flight(session, self._worker)) is not None:
-                    self._abort_registry.register(
+            with self._part.database.write() as session:
+                if (request := flight_rows.claim_flight(session, self._part.worker)) is not None:
+                    self._part.abort_registry.register(
                         request.trial_id
                     )  # before a client can see that it runs, and abort it
-                    undo.callback(self._abort_registry.unregister, request.trial_id)
+                    undo.callback(self._part.abort_registry.unregister, request.trial_id)
             undo.pop_all()
         return request
 
@@ -116,18 +96,18 @@ class FlightRunner:
             campaign_id=request.campaign_id, trial_id=request.trial_id, flight_id=request.flight_id
         ):
             try:
-                self._store_outcome(request, self._fly(request, self._abort_registry.register(request.trial_id)))
+                self._store_outcome(request, self._fly(request, self._part.abort_registry.register(request.trial_id)))
             except Exception:  # noqa: BLE001 - outermost frame of the thread
                 _log.exception("the end of a flight cannot be stored; the trial is lost at the next start")
             finally:
-                self._abort_registry.unregister(request.trial_id)
+                self._part.abort_registry.unregister(request.trial_id)
 
     def _fly(self, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         if flag.request is not None:
             return flight_rows.withdrawn_outcome(flag.request)
         try:
             self._spool.reserve(request.flight_id)
-            telemetry_log(self._data_dir, request.flight_id).parent.mkdir(exist_ok=True)
+            telemetry_log(self._part.data_dir, request.flight_id).parent.mkdir(exist_ok=True)
             backend = self._acquire_backend(request)
         except (GainlineError, OSError) as error:
             return FlightOutcome(problem=f"The flight was not started: {error}")
@@ -149,7 +129,7 @@ class FlightRunner:
         try:
             self._phase(request, "staging")
             flag.add_listener(lambda stop: backend.cancel_flight(request.trial_id, stop))
-            for message in backend.fly(request, self._publish):
+            for message in backend.fly(request, self._part.publish):
                 match message:
                     case GainsStaged(read_back):
                         ended = self._staged(request, flag, backend, read_back)
@@ -177,13 +157,13 @@ class FlightRunner:
         """Command the takeoff if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
         try:
-            self._store(lambda session: flight_rows.record_staged(session, request.flight_id, read_back))
+            self._part.store(lambda session: flight_rows.record_staged(session, request.flight_id, read_back))
             if mismatch := find_mismatch(read_back, request.gains):
                 ended = FlightOutcome(problem=f"The vehicle did not accept the gains: {mismatch}. It was not flown.")
             elif (withdrawn := self._await_takeoff_clearance(request, flag, backend)) is not None:
                 ended = withdrawn
             else:
-                self._store(lambda session: flight_rows.record_lift_off(session, request.flight_id))
+                self._part.store(lambda session: flight_rows.record_lift_off(session, request.flight_id))
         except GainlineError as error:
             ended = FlightOutcome(
                 problem=f"The flight was not started, because its start could not be recorded: {error}"
@@ -202,26 +182,28 @@ class FlightRunner:
         if request.mode == "fly":
             return None if flag.request is None else flight_rows.withdrawn_outcome(flag.request)
         self._phase(request, "staged")
-        until_s = self._clock.now_s() + STAGED_FOR_S
-        while self._clock.now_s() < until_s:
+        until_s = self._part.clock.now_s() + STAGED_FOR_S
+        while self._part.clock.now_s() < until_s:
             if flag.request is not None:
                 return flight_rows.withdrawn_outcome(flag.request)
             if why := backend.staging_lost if backend.alive else "the vehicle's process ended":
                 return FlightOutcome(withdrawn=True, problem=why)
             try:
-                with self._database.read() as session:
+                with self._part.database.read() as session:
                     may_take_off, stands_down = flight_rows.clearance_of(session, request.flight_id)
                 if may_take_off or stands_down is not None:
                     return stands_down
             except StorageError as error:
                 _log.error("the takeoff request cannot be read", why=str(error))
-                self._clock.wait_s(RETRY_S)
-            self._clock.wait_s(POLL_INTERVAL_S)
+                self._part.clock.wait_s(RETRY_S)
+            self._part.clock.wait_s(POLL_INTERVAL_S)
         why = f"its takeoff was not requested within {STAGED_FOR_S / 60:g} minutes"
         return FlightOutcome(withdrawn=True, problem=why)
 
     def _phase(self, request: FlightRequest, phase: Phase, note: str = "") -> None:
-        self._publish(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase=phase, note=note))
+        self._part.publish(
+            FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase=phase, note=note)
+        )
 
     def _store_outcome(self, request: FlightRequest, ended: FlightOutcome) -> None:
         """Store the outcome; if the database refuses it, set the record aside and give the flight up instead.
@@ -255,25 +237,21 @@ class FlightRunner:
     def _store_with_retry(self, request: FlightRequest, work: Callable[[Session], None]) -> bool:
         """Retry until the database accepts it; False when the worker closes meanwhile (the spool keeps the record)."""
 
-        def store() -> bool:
-            self._store(work)
+        def store(session: Session) -> bool:
+            work(session)
             return True
 
         def refused(error: StorageError) -> None:
             _log.error("outcome not stored yet", why=str(error))
             self._phase(request, "landed", f"The outcome could not be stored yet; Gainline keeps trying: {error}")
 
-        return retry_until_stored(store, refused, closing=self._closing, clock=self._clock) is not None
+        return self._part.store_with_retry(store, refused) is not None
 
     def _spool_record(self, request: FlightRequest, record: FlightRecord) -> None:
         try:
             self._spool.write(request.flight_id, record)
         except StorageError as error:  # the record is still in memory and is stored from there
             _log.error("record not spooled", why=str(error))
-
-    def _store(self, work: Callable[[Session], None]) -> None:
-        with self._database.write() as session:
-            work(session)
 
     def _recover_record(self, flight_id: int) -> None:
         """Move a record from the spool into the database; set a damaged or refused one aside. Raises StorageError."""
@@ -283,7 +261,7 @@ class FlightRunner:
             self._set_record_aside(flight_id, error)
             return
         try:
-            self._store(lambda session: flight_rows.recover_record(session, flight_id, record))
+            self._part.store(lambda session: flight_rows.recover_record(session, flight_id, record))
         except StorageError:
             raise
         except GainlineError as error:

@@ -33,66 +33,6 @@ from app.live.messages import (
 
 _log = structlog.get_logger(__name__)
 
-_OVER = frozenset({"landed", "ended"})
-
-
-class LiveState:
-    """Accumulates the telemetry of each flight until it is over, and keeps each vehicle's newest status.
-
-    `clock_s` gives the age of a message when it is sent again: from a worker that hangs, no newer one comes.
-    """
-
-    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
-        self._clock_s = clock_s
-        self._flights: dict[int, tuple[Telemetry, float]] = {}
-        self._vehicles: dict[int, tuple[VehicleStatus, float]] = {}
-
-    def take(self, message: PublishedMessage) -> None:
-        match message:
-            case VehicleStatus():
-                self._vehicles[message.vehicle_id] = message, self._clock_s()
-            case FlightPhase():
-                if message.phase in _OVER:
-                    self._flights.pop(message.trial_id, None)
-            case Telemetry():
-                self._flights[message.trial_id] = self._grown(message), self._clock_s()
-
-    def forget_all(self) -> None:
-        """Forget everything, after the loss of the worker."""
-        self._flights.clear()
-        self._vehicles.clear()
-
-    def snapshot(self) -> list[PublishedMessage]:
-        """One message for each vehicle, and one for each flight with its telemetry since the command, each with its
-        age."""
-        now_s = self._clock_s()
-        vehicles = (replace(status, age_s=now_s - heard_s) for status, heard_s in self._vehicles.values())
-        flights = (
-            replace(flight, samples=list(flight.samples), age_s=now_s - heard_s)
-            for flight, heard_s in self._flights.values()
-        )
-        return [*vehicles, *flights]
-
-    def vehicle(self, vehicle_id: int) -> VehicleStatus | None:
-        """The vehicle's newest status with its age; None if none has come from this worker."""
-        if (known := self._vehicles.get(vehicle_id)) is None:
-            return None
-        status, heard_s = known
-        return replace(status, age_s=self._clock_s() - heard_s)
-
-    def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
-        """The newest status of each vehicle whose link is in that state."""
-        return [status for status, _ in self._vehicles.values() if status.state == state]
-
-    def _grown(self, message: Telemetry) -> Telemetry:
-        """The message with all earlier samples of the flight."""
-        if message.trial_id not in self._flights:
-            return replace(message, samples=list(message.samples))
-        before, _ = self._flights[message.trial_id]
-        before.samples.extend(message.samples)
-        return replace(message, samples=before.samples)
-
-
 WAITING_CHANGES: Final = 2000
 """A stream that lags behind by more changes is ended; its client reconnects with the last id and misses none."""
 WAITING_TELEMETRY: Final = 100
@@ -165,11 +105,17 @@ class Subscription:
 
 
 class Hub:
-    """Sends every event to every subscription; never waits for a slow one."""
+    """Sends every event to every subscription; never waits for a slow one.
 
-    def __init__(self) -> None:
+    It accumulates the telemetry of each flight until it is over, and keeps each vehicle's newest status. `clock_s`
+    gives the age of a message when it is sent again: from a worker that hangs, no newer one comes.
+    """
+
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._clock_s = clock_s
         self._subscriptions: set[Subscription] = set()
-        self._memory = LiveState()
+        self._flights: dict[int, tuple[Telemetry, float]] = {}
+        self._vehicles: dict[int, tuple[VehicleStatus, float]] = {}
         self._written: dict[int, tuple[PublishedMessage, str]] = {}
         self._open = True
 
@@ -181,7 +127,7 @@ class Hub:
         ends at once when the hub is closed.
         """
         subscription = Subscription()
-        for known in self._memory.snapshot():
+        for known in self.snapshot():
             subscription.push(known)
         self._subscriptions.add(subscription)
         if not self._open:
@@ -191,26 +137,50 @@ class Hub:
         finally:
             self._subscriptions.discard(subscription)
 
-    @property
-    def streams(self) -> int:
-        return len(self._subscriptions)
+    def snapshot(self) -> list[PublishedMessage]:
+        """One message for each vehicle, and one for each flight with its telemetry since the command, each with its
+        age."""
+        now_s = self._clock_s()
+        vehicles = (replace(status, age_s=now_s - heard_s) for status, heard_s in self._vehicles.values())
+        flights = (
+            replace(flight, samples=list(flight.samples), age_s=now_s - heard_s)
+            for flight, heard_s in self._flights.values()
+        )
+        return [*vehicles, *flights]
 
     def vehicle(self, vehicle_id: int) -> VehicleStatus | None:
-        """The vehicle's newest status with its age; may be called from any thread."""
-        return self._memory.vehicle(vehicle_id)
+        """The vehicle's newest status with its age; None if none has come from this worker. May be called from any
+        thread."""
+        if (known := self._vehicles.get(vehicle_id)) is None:
+            return None
+        status, heard_s = known
+        return replace(status, age_s=self._clock_s() - heard_s)
 
     def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
-        """Status of the vehicles whose link is in that state."""
-        return self._memory.vehicles(state)
+        """The newest status of each vehicle whose link is in that state."""
+        return [status for status, _ in self._vehicles.values() if status.state == state]
 
     def publish(self, item: Change | LiveItem) -> None:
         match item:
-            case Telemetry() | FlightPhase() | VehicleStatus():
-                self._memory.take(item)
+            case VehicleStatus():
+                self._vehicles[item.vehicle_id] = item, self._clock_s()
+            case FlightPhase(phase="landed" | "ended"):
+                self._flights.pop(item.trial_id, None)
+            case Telemetry():
+                self._flights[item.trial_id] = self._grown(item), self._clock_s()
             case LinkState(worker=False):
-                self._memory.forget_all()
+                self._flights.clear()
+                self._vehicles.clear()
         for subscription in self._subscriptions:
             subscription.push(item)
+
+    def _grown(self, message: Telemetry) -> Telemetry:
+        """The message with all earlier samples of the flight."""
+        if message.trial_id not in self._flights:
+            return replace(message, samples=list(message.samples))
+        before, _ = self._flights[message.trial_id]
+        before.samples.extend(message.samples)
+        return replace(message, samples=before.samples)
 
     def text(self, item: PublishedMessage) -> str:
         """JSON of a message, encoded once for all streams."""

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, Self, TypeVar
+from typing import Final, Self
 
 import structlog
 
@@ -23,18 +23,15 @@ from app.core.errors import GainlineError, InputError
 from app.live.messages import (
     MAX_LINE_BYTES,
     Abort,
-    AbortAnswer,
     Answer,
     FromWorker,
     Message,
     Ping,
-    Pong,
     PublishedMessage,
     Telemetry,
     ToWorker,
     VehicleCommandKind,
     VehicleOrder,
-    VehicleOrderAnswer,
     VehicleStatus,
     WorkerHello,
     decode,
@@ -60,7 +57,6 @@ ORDER_TIMEOUT_S: Final = 1.5
 PING_EVERY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
-A = TypeVar("A", AbortAnswer, VehicleOrderAnswer, Pong)
 
 
 class LiveServer:
@@ -132,11 +128,10 @@ class LiveServer:
             writer.close()
 
     def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
-        answer: Message
         match decode(line):
             case Abort(request=request, trial_id=trial_id, reason=reason, by_s=by_s):
                 accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
-                answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
+                answer = Answer(request=request, accepted=accepted)
                 _log.info("abort requested", trial_id=trial_id, reason=reason, accepted=accepted)
             case VehicleOrder() as ordered:
                 task = self._loop.create_task(self._pass_on(ordered, writer))
@@ -144,7 +139,7 @@ class LiveServer:
                 task.add_done_callback(self._orders.discard)
                 return
             case Ping(request=request):
-                answer = Pong(request=request)
+                answer = Answer(request=request)
             case other:
                 raise InputError(
                     f"A client sent {other.type!r}, which only the worker may send.",
@@ -162,10 +157,9 @@ class LiveServer:
             )
             await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
             problem = forwarded.result() if forwarded.done() else UNCONFIRMED
-        vehicle_id, accepted = ordered.vehicle_id, not problem
+        vehicle_id = ordered.vehicle_id
         _log.info("vehicle command", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
-        answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)
-        writer.write(encode(answer))
+        writer.write(encode(Answer(request=ordered.request, accepted=not problem, problem=problem)))
 
     def _send_all(self, message: FromWorker) -> None:
         line = encode(message)
@@ -230,7 +224,7 @@ class LiveClient:
             await asyncio.sleep(PING_EVERY_S)
             if self.connected:
                 try:
-                    await self._ask(Ping(request=next(self._numbers)), Pong)
+                    await self._ask(Ping(request=next(self._numbers)))
                 except LinkDownError:
                     self._note(answers=False)
                 else:
@@ -255,34 +249,32 @@ class LiveClient:
             pause_s = FIRST_PAUSE_S
             await self._listen(reader, writer)
 
-    async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
+    async def abort(self, trial_id: int, reason: str) -> Answer:
         """Request that the worker aborts a flight, without the database, and wait for its answer. Raises
         LinkDownError when it cannot be reached."""
-        question = Abort(request=next(self._numbers), trial_id=trial_id, reason=reason, by_s=_deadline_s())
-        return await self._ask(question, AbortAnswer)
+        number = next(self._numbers)
+        return await self._ask(Abort(request=number, trial_id=trial_id, reason=reason, by_s=_deadline_s()))
 
-    async def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
+    async def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> Answer:
         """Request that the worker lands a vehicle or stops its motors. Raises LinkDownError as `abort` does."""
-        question = VehicleOrder(
-            request=next(self._numbers), vehicle_id=vehicle_id, order=order, reason=reason, by_s=_deadline_s()
+        number = next(self._numbers)
+        return await self._ask(
+            VehicleOrder(request=number, vehicle_id=vehicle_id, order=order, reason=reason, by_s=_deadline_s())
         )
-        return await self._ask(question, VehicleOrderAnswer)
 
-    async def _ask(self, question: ToWorker, kind: type[A]) -> A:
+    async def _ask(self, question: ToWorker) -> Answer:
         if self._writer is None:
             raise _link_down("no worker is running")
-        answered = self._waiting[question.request] = asyncio.get_running_loop().create_future()
+        answered: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
+        self._waiting[question.request] = answered
         self._writer.write(encode(question))
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT_S):  # wait_for can swallow a cancellation in Python 3.11
-                answer = await answered
+                return await answered
         except TimeoutError as error:
             raise _link_down(f"the worker did not answer within {ANSWER_TIMEOUT_S:g} s") from error
         finally:
             del self._waiting[question.request]
-        if not isinstance(answer, kind):
-            raise _link_down(f"the worker sent an unexpected answer: {answer.type}")
-        return answer
 
     async def _listen(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -299,7 +291,7 @@ class LiveClient:
                 self._writer, self._answers = writer, True
                 self._on_message(message)
                 self._on_link(True)
-            case AbortAnswer(request=request) | VehicleOrderAnswer(request=request) | Pong(request=request):
+            case Answer(request=request):
                 if (answer := self._waiting.get(request)) is not None and not answer.done():
                     answer.set_result(message)
             case Abort() | VehicleOrder() | Ping():

@@ -108,16 +108,6 @@ class Abort:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AbortAnswer:
-    """Answer to Abort; `accepted` is False when the worker is not flying that trial."""
-
-    request: int
-    trial_id: int
-    accepted: bool
-    type: Literal["abort answer"] = "abort answer"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleOrder:
     """Request to the worker: land this vehicle, or stop its motors at any height, now and whatever it is doing.
     `request` and `by_s` as in `Abort`."""
@@ -131,36 +121,27 @@ class VehicleOrder:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleOrderAnswer:
-    """Answer to VehicleOrder; `accepted` once the process that has the vehicle's link has forwarded the command.
-
-    `problem` says why it was not forwarded; it is then not carried out later.
-    """
-
-    request: int
-    vehicle_id: int
-    accepted: bool
-    problem: str = ""
-    type: Literal["order answer"] = "order answer"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Ping:
-    """Request that the worker answers with Pong; a worker that hangs does not."""
+    """Request that a worker that hangs does not answer."""
 
     request: int
     type: Literal["ping"] = "ping"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pong:
+class Answer:
+    """Answer of the worker to the request of this number. `accepted` is False when it is not flying the trial of an
+    abort, or when the process that has the vehicle's link has not forwarded a command, which is then not carried out
+    later: `problem` says why."""
+
     request: int
-    type: Literal["pong"] = "pong"
+    accepted: bool = True
+    problem: str = ""
+    type: Literal["answer"] = "answer"
 
 
 PublishedMessage = Telemetry | FlightPhase | VehicleStatus
 """Messages that the event streams pass on unchanged."""
-Answer = AbortAnswer | VehicleOrderAnswer | Pong
 FromWorker = PublishedMessage | WorkerHello | Answer
 ToWorker = Abort | VehicleOrder | Ping
 Message = FromWorker | ToWorker

@@ -38,6 +38,7 @@ from app.db.session import RETRY_S, Database, retry_until_stored
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
+from app.flights.worker_part import WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
@@ -190,29 +191,18 @@ class Worker:
         def publish(message: PublishedMessage) -> None:
             live.publish(message)
 
-        data_dir, closing = self.settings.data_dir, self.ending.event
-        sessions = VehicleConnectionManager(
-            database,
-            data_dir,
-            self.abort_registry,
-            publish,
+        part = WorkerPart(
+            database=database,
+            data_dir=self.settings.data_dir,
+            abort_registry=self.abort_registry,
+            publish=publish,
             worker=self.name,
-            closing=closing,
-            links=is_loopback(self.settings.host),
+            closing=self.ending.event,
             clock=self.clock,
         )
-        live = LiveServer(live_address(data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
-        flight_runner = FlightRunner(
-            database,
-            data_dir,
-            self.abort_registry,
-            publish,
-            worker=self.name,
-            closing=closing,
-            session=sessions.session,
-            clock=self.clock,
-        )
-        return sessions, flight_runner, live
+        sessions = VehicleConnectionManager(part, links=is_loopback(self.settings.host))
+        live = LiveServer(live_address(part.data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
+        return sessions, FlightRunner(part, session=sessions.session), live
 
     def _build_job_runners(
         self, database: Database, pool: ComputePool, landscape_pool: ComputePool

@@ -80,7 +80,6 @@ class MocapOutput(Protocol):
 
     def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         """Send frames; return the messages to send over the drone's own link."""
-        ...
 
     def close(self) -> None: ...
 

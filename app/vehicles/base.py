@@ -26,22 +26,6 @@ Ending = Literal["completed", "aborted", "invalid"]
 
 
 @dataclass(frozen=True, slots=True)
-class VehicleOption:
-    """One setting of a vehicle kind, with its unit, range or choices, and default. `label`: the title without the help
-    for entering a value, empty if it contains none. `autopilots`: those that have it, empty for all."""
-
-    name: str
-    title: str
-    unit: str
-    default: OptionValue
-    lower: float | None = None
-    upper: float | None = None
-    choices: tuple[OptionValue, ...] = ()
-    label: str = ""
-    autopilots: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Sample:
     """Telemetry at one instant: seconds since the takeoff command, and the record's channels for live display,
     including the scored one."""
@@ -124,11 +108,9 @@ class Vehicle(Protocol):
 
     def stage(self, gains: Gains) -> dict[str, float]:
         """Write every gain and return the values read back."""
-        ...
 
     def read_gains(self) -> dict[str, float]:
         """Return the gains that the vehicle holds now."""
-        ...
 
     def fly(
         self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
@@ -140,7 +122,6 @@ class Vehicle(Protocol):
         with `not_flown` set if the vehicle was never commanded to take off. A flight that a request ended before the
         lift-off has a record without `has_flown`.
         """
-        ...
 
     def close(self) -> None: ...
 
@@ -232,63 +213,50 @@ class ConnectedVehicle(Vehicle, Protocol):
     @property
     def concern(self) -> str:
         """Reason why the vehicle may only be observed; empty if it may fly."""
-        ...
 
     @property
     def has_standing_order(self) -> bool:
         """Whether a command of `land` or `motors_off` is still being repeated because telemetry does not confirm it;
         False once it was repeated for a minute without a packet from the vehicle."""
-        ...
 
     def condition(self) -> Condition:
         """Return the state last received, without waiting."""
-        ...
 
     def attend(self, timeout_s: float) -> None:
         """Receive for `timeout_s` while sending the ground station's heartbeats. A command of `land` or `motors_off` is
         repeated every second until telemetry confirms it. Raises VehicleError if the link is closed."""
-        ...
 
     def confirm_staged(self) -> None:
         """Read the staged gains again after a silence of the vehicle. Raises VehicleError if it restarted meanwhile, or
         does not report the staged gains."""
-        ...
 
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks; a failed check is an item of the result, not an error."""
-        ...
 
     def parameters(self) -> dict[str, float]:
         """Read every parameter of the vehicle. Raises VehicleError if they do not arrive."""
-        ...
 
     def restore(self) -> dict[str, float]:
         """Write the safe gains and return the values read back, which are equal. A vehicle that is only observed stays
         so. Raises SafeGainsError if the vehicle is armed or does not accept them."""
-        ...
 
     def change_safe_gains(self, safe_gains: Gains) -> None:
         """Replace the safe gains and write them, as on connection. A failure becomes the `concern`. Raises GainsError
         for gains that the vehicle cannot hold."""
-        ...
 
     def land(self, words: str) -> None:
         """Command the vehicle to land at once, in any state; with the words of who asked, if any."""
-        ...
 
     def motors_off(self, words: str) -> None:
         """Stop the motors at once, at any height."""
-        ...
 
     def log_to(self, path: Path | None) -> None:
         """Record all packets from now on, in both directions, in this telemetry log; None ends the log. Raises
         VehicleError if the file cannot be opened; the previous log then continues."""
-        ...
 
     def release(self) -> None:
         """End the observation after a person has inspected the vehicle. It must be disarmed and hold its safe gains,
         read back. Otherwise raises VehicleError and changes nothing."""
-        ...
 
 
 class VehicleError(GainlineError):

@@ -8,6 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.gains import require_accepted
+from app.core.definition import Option
 from app.core.experiments.pitch_tracking import DETAIL_CHANNELS, OUTPUT, WINDOW_S, PitchTracking, named_channels
 from app.core.models.f16 import (
     AMPLITUDE_RAD,
@@ -24,18 +26,10 @@ from app.core.models.f16 import (
 )
 from app.core.policy import Gains, is_finite, shortened
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.base import (
-    FlightOptions,
-    FlightRecord,
-    OptionValue,
-    Sample,
-    ShouldStop,
-    Vehicle,
-    VehicleOption,
-)
+from app.vehicles.base import FlightOptions, OptionValue, Sample, ShouldStop, Vehicle
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options, VehicleKind
-from app.vehicles.simulated import GainHolder, Pacer, accept_gains, end_of
+from app.vehicles.simulated import CANNOT_HOLD, Pacer, StagedVehicle
 
 GAIN_NAMES: Final = PitchTracking.space.names
 LOG_NOISE: Final = np.array([3.0, math.radians(0.1), 0.5, math.radians(0.2), math.radians(0.1)])
@@ -49,39 +43,27 @@ _NO_BIAS: Final = np.empty((0, STATES))
 _LARGEST_GAIN: Final = float(np.finfo(np.float32).max)
 
 
-class LinearAircraft(GainHolder):
-    """Simulated aircraft that holds the controller's six gains and starts every flight from trim."""
+class LinearAircraft(StagedVehicle):
+    """Simulated aircraft that holds the controller's six gains, and tracks the reference for a minute, from trim.
+
+    A stop sets the safe gains and lets the pitch return to trim for ten seconds, which are part of the record. Once the
+    pitch error has reached 10 rad the state is frozen.
+    """
 
     def __init__(self, safe_gains: Gains, settings: Mapping[str, OptionValue]) -> None:
-        super().__init__("lti", safe_gains, _numbers)
-        self._settings = dict(settings)
+        super().__init__("lti", safe_gains, settings, _numbers)
         self._log_noise = float(settings["log_noise"])
 
-    def fly(
-        self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
-    ) -> FlightRecord:
-        """Track the reference for a minute with the staged gains, with simulated time limited to the order's speed.
-
-        `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first. A stop sets the
-        safe gains and lets the pitch return to trim for ten seconds, which are part of the record. Once the pitch error
-        has reached 10 rad the state is frozen. Raises VehicleError if no gains were staged.
-        """
-        self._require_staged()
+    def _flown(
+        self, order: FlightOptions, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> tuple[Trajectory, StopRequest | None, bool]:
         tracking, noise = _TrackingRun(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
-        try:
-            detail = _flown(noise, tracking)
-            flown_steps, stop = _send_samples(detail, Pacer(order.speed, order.clock), on_sample, should_stop)
-        finally:
-            self._restore()
+        detail = _flown(noise, tracking)
+        flown_steps, stop = _send_samples(detail, Pacer(order.speed, order.clock), on_sample, should_stop)
         if stop is not None:
             returning = _TrackingRun(self.safe_gains, 0.0, _RECOVERY_STEPS if flown_steps else 1)
             detail = _flown(noise, replace(tracking, steps=flown_steps), returning)
-        return FlightRecord(
-            trajectory=_trajectory(detail),
-            ending="completed" if stop is None else "aborted",
-            end=end_of(stop, has_flown=flown_steps > 0),
-            settings=self._settings,
-        )
+        return _trajectory(detail), stop, flown_steps > 0
 
 
 def whole_flight(gains: Gains, *, log_noise: float, seed: int) -> Trajectory:
@@ -142,7 +124,8 @@ def _sample(step: int, row: Samples) -> Sample:
 
 
 def _numbers(gains: Gains) -> dict[str, float]:
-    return accept_gains(gains, GAIN_NAMES, _refusal, kind=float, numbers="finite numbers")
+    require_accepted(gains, dict.fromkeys(GAIN_NAMES, _refusal), CANNOT_HOLD, " as finite numbers")
+    return {name: float(gains[name]) for name in GAIN_NAMES}
 
 
 def _refusal(value: float) -> str | None:
@@ -163,11 +146,11 @@ LTI: Final = VehicleKind(
     can_fly=True,
     experiments=("pitch-tracking",),
     options=(
-        VehicleOption(
+        Option(
             "log_noise",
             "Noise of the recorded states, as a multiple of 3 ft, 0.1°, 0.5 ft/s, 0.2°, 0.1 °/s at 50 Hz",
-            "×",
             0.0,
+            "×",
             0.0,
             10.0,
         ),

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from app.core.control.vertical_guidance import RATE_HZ, STEP_S
+from app.core.definition import Option
 from app.core.errors import Problem
 from app.core.formatting import percent
 from app.core.models.vertical import GRAVITY_M_S2
-from app.vehicles.base import VehicleError, VehicleOption
+from app.vehicles.base import VehicleError
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, COMMAND_SIZE, Integers, Rows, control
 from app.vehicles.kinds import Hosts, Options, VehicleKind
 from app.vehicles.simulated import HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
@@ -194,15 +195,15 @@ JSBSIM: Final = VehicleKind(
     can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
-        VehicleOption("thrust_scale", "Thrust, as a multiple of the airframe's", "×", 1.0, 0.7, 1.5),
-        VehicleOption("mass_kg", "Mass", "kg", MASS_KG, 0.3, 0.6),
-        VehicleOption("motor_lag_s", "Motor lag", "s", 0.0, 0.0, 0.15),
-        VehicleOption("start_latency_s", "Start latency", "s", 0.0, 0.0, 2.0),
-        VehicleOption("wind_m_s", "Steady wind", "m/s", 0.0, 0.0, 10.0),
-        VehicleOption("wind_from_deg", "Direction the wind comes from, clockwise from north", "°", 0.0, 0.0, 360.0),
-        VehicleOption("gust_m_s", "Gusts in each direction, root mean square", "m/s", 0.0, 0.0, 3.0),
-        VehicleOption("altitude_noise_m", "Noise of the measured altitude, standard deviation", "m", 0.0, 0.0, 0.1),
-        VehicleOption("battery_sag", "Share of the voltage lost under full load", "of the voltage", 0.0, 0.0, 0.2),
+        Option("thrust_scale", "Thrust, as a multiple of the airframe's", 1.0, "×", 0.7, 1.5),
+        Option("mass_kg", "Mass", MASS_KG, "kg", 0.3, 0.6),
+        Option("motor_lag_s", "Motor lag", 0.0, "s", 0.0, 0.15),
+        Option("start_latency_s", "Start latency", 0.0, "s", 0.0, 2.0),
+        Option("wind_m_s", "Steady wind", 0.0, "m/s", 0.0, 10.0),
+        Option("wind_from_deg", "Direction the wind comes from, clockwise from north", 0.0, "°", 0.0, 360.0),
+        Option("gust_m_s", "Gusts in each direction, root mean square", 0.0, "m/s", 0.0, 3.0),
+        Option("altitude_noise_m", "Noise of the measured altitude, standard deviation", 0.0, "m", 0.0, 0.1),
+        Option("battery_sag", "Share of the voltage lost under full load", 0.0, "of the voltage", 0.0, 0.2),
     ),
     open=opener("jsbsim", JsbsimFlight),
     find_conflicts=_cannot_lift,

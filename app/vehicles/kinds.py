@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from app.core.definition import Option, with_defaults
 from app.core.errors import InputError, Problem
-from app.core.formatting import allowed_range
-from app.core.policy import Gains, is_finite, shortened
-from app.vehicles.base import ConnectedVehicle, Identity, OptionValue, Vehicle, VehicleOption
+from app.core.policy import Gains
+from app.vehicles.base import ConnectedVehicle, Identity, OptionValue, Vehicle
 
 Options = Mapping[str, OptionValue]
 Hosts = frozenset[str]
@@ -48,7 +48,7 @@ class VehicleKind:
     is_real: bool
     can_fly: bool
     experiments: tuple[str, ...]
-    options: tuple[VehicleOption, ...]
+    options: tuple[Option, ...]
     open: Callable[[Options, Gains, Path | None], Vehicle]
     connect: Callable[[Options, Gains, Path, Identity | None, Callable[[], None], bool], ConnectedVehicle] | None = None
     find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = lambda _options, _hosts: ()
@@ -69,7 +69,7 @@ class VehicleKind:
 
     def completed(self, options: Options) -> dict[str, OptionValue]:
         """Complete options stored by another version: add new ones at their defaults, drop unknown ones."""
-        return {option.name: options.get(option.name, option.default) for option in self.options}
+        return with_defaults(options, self.options)
 
     def check(
         self, options: Mapping[str, object], *, field: str, simulation_hosts: Hosts = HERE
@@ -101,7 +101,7 @@ class VehicleKind:
         return complete
 
 
-def _accept(option: VehicleOption, value: object) -> tuple[OptionValue, str | None]:
+def _accept(option: Option, value: object) -> tuple[OptionValue, str | None]:
     """Return `value` in the type of the option's default, and the reason if it is invalid."""
     default = option.default
     if isinstance(default, bool | str):
@@ -109,12 +109,8 @@ def _accept(option: VehicleOption, value: object) -> tuple[OptionValue, str | No
         return (value, None) if isinstance(value, bool | str) and fits else (default, _expected(default))
     if isinstance(value, bool) or not isinstance(value, int | float):
         return default, f"must be a number, got {value!r}"
-    if not is_finite(value):
-        return default, f"must be a finite number, got {shortened(value)}"
-    low, high = option.lower, option.upper
-    if (low is not None and value < low) or (high is not None and value > high):
-        return default, f"must be {allowed_range(low, high)} {option.unit}, got {value:g}"
-    return float(value), None
+    reason = option.refusal(value)
+    return (float(value), None) if reason is None else (default, reason)
 
 
 def _expected(default: bool | str) -> str:

@@ -10,16 +10,10 @@ from app.autopilots.autopilot import Autopilot
 from app.autopilots.gains import check_gains
 from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import ScaledClock
+from app.core.definition import Option
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
-from app.vehicles.base import (
-    ALTITUDE_LIMIT_M,
-    HIGHEST_SET_POINT_M,
-    LAND_COMMAND_S,
-    RECORDED_BEYOND_S,
-    Identity,
-    VehicleOption,
-)
+from app.vehicles.base import ALTITUDE_LIMIT_M, HIGHEST_SET_POINT_M, LAND_COMMAND_S, RECORDED_BEYOND_S, Identity
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.addresses import UdpAddress
@@ -161,78 +155,71 @@ MAVLINK: Final = VehicleKind(
     can_fly=True,
     experiments=tuple(dict.fromkeys(each.name for autopilot in AUTOPILOTS.values() for each in autopilot.experiments)),
     options=(
-        VehicleOption("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", "", _DEFAULT.name, label="Kind of autopilot"),
-        VehicleOption(
+        Option("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", _DEFAULT.name, label="Kind of autopilot"),
+        Option(
             "address",
             "Address of the vehicle: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
-            "",
             _DEFAULT.simulated_address,
             label="Address",
         ),
-        VehicleOption("simulated", "Simulated vehicle on this computer", "", False),
-        VehicleOption("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
-        VehicleOption(
+        Option("simulated", "Simulated vehicle on this computer", False),
+        Option("system_id", "MAVLink system id; 0: the first autopilot received", 0.0, "", 0.0, 255.0),
+        Option(
             "aircraft_id",
             f"{_titles(_PLANNED)}'s aircraft id (AC_ID); 0: the same as the system id",
-            "",
             0.0,
+            "",
             0.0,
             255.0,
             autopilots=_names(_PLANNED),
         ),
-        VehicleOption("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
-        VehicleOption(
+        Option("telemetry_hz", "Requested rate of positions", 50.0, "Hz", 40.0, 200.0),
+        Option(
             "climb_waypoint",
             f"{_titles(_PLANNED)}: number of the waypoint that the takeoff climbs to",
-            "",
             2.0,
+            "",
             1.0,
             254.0,
             autopilots=_names(_PLANNED),
         ),
-        VehicleOption("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
-        VehicleOption("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
-        VehicleOption(
+        Option("min_battery_v", "Lowest battery voltage to fly with", 10.5, "V", 0.0, 60.0),
+        Option("radius_m", "Maximum distance from the start", 5.0, "m", 0.5, 100.0),
+        Option(
             "plan_radius_m",
             f"{_titles(_PLANNED)}: maximum distance from HOME in the flight plan",
-            "m",
             8.0,
+            "m",
             0.5,
             1000.0,
             autopilots=_names(_PLANNED),
         ),
-        VehicleOption(
+        Option(
             "plan_time_s",
             f"{_titles(_PLANNED)}: time limit of the flight plan's takeoff",
-            "s",
             45.0,
+            "s",
             15.0,
             600.0,
             autopilots=_names(_PLANNED),
         ),
-        VehicleOption("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
-        VehicleOption(
+        Option("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", 1.0, "×", 0.1, 100.0),
+        Option(
             "second_source",
             "Second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
             "",
-            "",
             label="Second source of altitude",
         ),
-        VehicleOption("scored_source", "Scored source of altitude", "", "vehicle", choices=SCORED),
-        VehicleOption(
+        Option("scored_source", "Scored source of altitude", "vehicle", choices=SCORED),
+        Option(
             "signing_key_file",
             f"{_titles(_SIGNING)}: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
-            "",
             "",
             label="Signing key file",
             autopilots=_names(_SIGNING),
         ),
-        VehicleOption(
-            "log_folder",
-            "Folder for the telemetry logs of all flights; empty: none",
-            "",
-            "",
-            label="Telemetry log folder",
+        Option(
+            "log_folder", "Folder for the telemetry logs of all flights; empty: none", "", label="Telemetry log folder"
         ),
     ),
     open=_open,

@@ -3,12 +3,14 @@ disturbances, aborts.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Final, Protocol
 
 import numpy as np
 
+from app.autopilots.gains import require_accepted
 from app.core.clock import REAL_TIME, Clock
 from app.core.control.vertical_guidance import (
     ALT,
@@ -22,7 +24,7 @@ from app.core.control.vertical_guidance import (
     THROTTLE,
     fix,
 )
-from app.core.errors import GainsError, InputError, Problem
+from app.core.errors import InputError, Problem
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, shortened
@@ -53,24 +55,7 @@ from app.vehicles.kernels import (
 )
 from app.vehicles.kinds import Options
 
-
-def accept_gains(
-    gains: Gains, names: Sequence[str], refusal: Callable[[float], str | None], *, kind: type[float], numbers: str
-) -> dict[str, float]:
-    """Return the gains, complete and in order, each as `kind`. Raises GainsError naming every unknown or missing gain
-    and each for which `refusal` returns a reason; `numbers` describes the accepted values."""
-    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in names]
-    for name in names:
-        reason = refusal(gains[name]) if name in gains else "is missing"
-        if reason is not None:
-            problems.append(Problem(f"gains.{name}", reason))
-    if problems:
-        raise GainsError(
-            "The vehicle cannot hold these gains.",
-            problems=tuple(problems),
-            hint=f"Send {', '.join(names)} as {numbers}.",
-        )
-    return {name: kind(gains[name]) for name in names}
+CANNOT_HOLD: Final = "The vehicle cannot hold these gains."
 
 
 LISTEN_EVERY_S: Final = 0.02
@@ -139,16 +124,23 @@ class Simulation(Protocol):
     def advance(self, steps: int, command: Integers) -> Rows:
         """Fly `steps` steps of 1/512 s under the autopilot's `command`; return one row of `CHANNELS` for each, shape
         (steps, 8), with the measurements at the beginning of the step and the resulting thrust."""
-        ...
 
 
-class GainHolder:
-    """The gains of a simulated vehicle between its flights; `accept` completes and checks them."""
+class StagedVehicle(ABC):
+    """A simulated vehicle that starts every flight anew, with its gains between the flights; `accept` completes and
+    checks them, `settings` describe the vehicle in its records."""
 
     is_real: Final = False
 
-    def __init__(self, kind: str, safe_gains: Gains, accept: Callable[[Gains], dict[str, float]]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        safe_gains: Gains,
+        settings: Mapping[str, OptionValue],
+        accept: Callable[[Gains], dict[str, float]],
+    ) -> None:
         self.kind: Final = kind
+        self._settings = dict(settings)
         self.safe_gains: Final[Gains] = accept(safe_gains)
         self._accept = accept
         self._held: dict[str, float] = dict(self.safe_gains)
@@ -165,32 +157,52 @@ class GainHolder:
         """Return the gains that the vehicle holds now."""
         return dict(self._held)
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027
         """Do nothing: no resource is open between flights."""
 
-    def _require_staged(self) -> None:
+    def fly(
+        self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> FlightRecord:
+        """Fly with the staged gains, with simulated time limited to the order's speed.
+
+        `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first; only a stop ends
+        the flight early. Afterwards the vehicle holds its safe gains. Raises VehicleError if no gains were staged or
+        the simulation diverged.
+        """
         if not self._staged:
             raise VehicleError(
                 "No gains were staged for this flight, so it was not started.",
                 hint="Stage the gains, check the read-back, then fly.",
             )
+        try:
+            trajectory, stop, has_flown = self._flown(order, on_sample, should_stop)
+        finally:
+            self._restore()
+        end = FlightEnd() if stop is None else FlightEnd(failure=Failure.OPERATOR, request=stop)
+        return FlightRecord(
+            trajectory=trajectory,
+            ending="completed" if stop is None else "aborted",
+            end=end if stop is None or has_flown else withdrawn_by(stop),
+            settings=self._settings,
+        )
+
+    @abstractmethod
+    def _flown(
+        self, order: FlightOptions, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> tuple[Trajectory, StopRequest | None, bool]:
+        """Fly; return the record, the stop request that ended the flight if any, and whether anything was flown."""
 
     def _restore(self) -> None:
         self._held = dict(self.safe_gains)
         self._staged = False
 
 
-def end_of(stop: StopRequest | None, *, has_flown: bool) -> FlightEnd:
-    """Return the end of a simulated flight, which only a request ends early."""
-    if stop is None or has_flown:
-        return FlightEnd(failure=None if stop is None else Failure.OPERATOR, request=stop)
-    return withdrawn_by(stop)
-
-
-class SimulatedVehicle(GainHolder):
+class SimulatedVehicle(StagedVehicle):
     """Simulated vehicle that holds the loop's three integer gains and starts every flight from rest on the ground.
 
-    `launch(order)` returns the simulation of one flight; `settings` describe the vehicle in its records.
+    `launch(order)` returns the simulation of one flight. A stop ends the flight there: the safe gains are set and the
+    vehicle descends at 0.5 m/s. The record includes the descent, whose set point is the ground; one that never rose
+    above `_LANDED_M` has not flown.
     """
 
     def __init__(
@@ -200,39 +212,22 @@ class SimulatedVehicle(GainHolder):
         settings: Mapping[str, OptionValue],
         launch: Callable[[FlightOptions], Simulation],
     ) -> None:
-        super().__init__(kind, safe_gains, _counts)
-        self._settings = dict(settings)
+        super().__init__(kind, safe_gains, settings, _counts)
         self._launch = launch
 
-    def fly(
-        self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
-    ) -> FlightRecord:
-        """Fly to the order's set points with the staged gains, with simulated time limited to the order's speed.
-
-        `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
-        flight there: the safe gains are set and the vehicle descends at 0.5 m/s. The record includes the descent, whose
-        set point is the ground; one that never rose above `_LANDED_M` has not flown. Afterwards the vehicle holds its
-        safe gains. Raises VehicleError if no gains were staged or the simulation diverged.
-        """
-        self._require_staged()
-        try:
-            simulation = self._launch(order)
-            rows: list[Rows] = []
-            stop = self._take_off(simulation, rows, order, on_sample, should_stop)
-            self._restore()
-            if stop is not None and rows:
-                rows.extend(self._land(simulation, rows[-1]))
-            elif stop is not None:  # before the first step: a single instant on the ground
-                rows.append(_flown(simulation, 1, _command(THROTTLE, 0, self._held), 0.0))
-        finally:
-            self._restore()
+    def _flown(
+        self, order: FlightOptions, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> tuple[Trajectory, StopRequest | None, bool]:
+        simulation = self._launch(order)
+        rows: list[Rows] = []
+        stop = self._take_off(simulation, rows, order, on_sample, should_stop)
+        self._restore()
+        if stop is not None and rows:
+            rows.extend(self._land(simulation, rows[-1]))
+        elif stop is not None:  # before the first step: a single instant on the ground
+            rows.append(_flown(simulation, 1, _command(THROTTLE, 0, self._held), 0.0))
         flown = np.concatenate(rows)
-        return FlightRecord(
-            trajectory=trajectory_of(flown, self.kind),
-            ending="completed" if stop is None else "aborted",
-            end=end_of(stop, has_flown=bool(flown[:, ALTITUDE].max() > _LANDED_M)),
-            settings=self._settings,
-        )
+        return trajectory_of(flown, self.kind), stop, bool(flown[:, ALTITUDE].max() > _LANDED_M)
 
     def _take_off(
         self,
@@ -332,7 +327,8 @@ def _sample(step: int, row: Rows) -> Sample:
 
 
 def _counts(gains: Gains) -> dict[str, float]:
-    return accept_gains(gains, GAIN_NAMES, _refusal, kind=int, numbers="whole numbers of counts")
+    require_accepted(gains, dict.fromkeys(GAIN_NAMES, _refusal), CANNOT_HOLD, " as whole numbers of counts")
+    return {name: int(gains[name]) for name in GAIN_NAMES}
 
 
 def _refusal(value: float) -> str | None:

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from app.core.control.vertical_guidance import RATE_HZ, STEP_S
+from app.core.definition import Option
 from app.core.errors import Problem
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS
 from app.core.formatting import percent
-from app.vehicles.base import VehicleOption
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, PAST, Integers, Rows, fly_simple_model
 from app.vehicles.kinds import Hosts, Options, VehicleKind
 from app.vehicles.simulated import FLIGHT_S, HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
@@ -102,20 +102,18 @@ TWIN: Final = VehicleKind(
     can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
-        VehicleOption("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", "×", 1.0, 0.0, 5.0),
-        VehicleOption("hover_throttle", "Hover throttle", "of full throttle", 0.61, 0.3, 0.95),
-        VehicleOption("motor_lag_s", "Motor lag", "s", 0.05, 0.0, 0.3),
-        VehicleOption("start_latency_s", "Start latency", "s", 0.3, 0.0, 2.0),
-        VehicleOption("drag_1_s", "Drag", "per s", 0.0, 0.0, 1.0),
-        VehicleOption("quadratic_share", "Share of the thrust that grows with the command's square", "", 0.0, 0.0, 1.0),
-        VehicleOption(
-            "ground_effect", "Ground effect: extra thrust on the ground, as a share of the thrust", "", 0.0, 0.0, 0.5
+        Option("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", 1.0, "×", 0.0, 5.0),
+        Option("hover_throttle", "Hover throttle", 0.61, "of full throttle", 0.3, 0.95),
+        Option("motor_lag_s", "Motor lag", 0.05, "s", 0.0, 0.3),
+        Option("start_latency_s", "Start latency", 0.3, "s", 0.0, 2.0),
+        Option("drag_1_s", "Drag", 0.0, "per s", 0.0, 1.0),
+        Option("quadratic_share", "Share of the thrust that grows with the command's square", 0.0, "", 0.0, 1.0),
+        Option(
+            "ground_effect", "Ground effect: extra thrust on the ground, as a share of the thrust", 0.0, "", 0.0, 0.5
         ),
-        VehicleOption("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 0.1, 2.0),
-        VehicleOption(
-            "measurement_delay_s", "Delay of the altitude and climb rate that the loop uses", "s", 0.0, 0.0, 0.1
-        ),
-        VehicleOption("battery_sag", "Share of the thrust lost evenly over 33 s", "", 0.0, 0.0, 0.1),
+        Option("ground_effect_height_m", "Height over which the ground effect fades", 0.4, "m", 0.1, 2.0),
+        Option("measurement_delay_s", "Delay of the altitude and climb rate that the loop uses", 0.0, "s", 0.0, 0.1),
+        Option("battery_sag", "Share of the thrust lost evenly over 33 s", 0.0, "", 0.0, 0.1),
     ),
     open=opener("twin", TwinFlight),
     find_conflicts=_cannot_lift,

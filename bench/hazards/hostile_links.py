@@ -334,7 +334,7 @@ def false_position(
 
 
 def _boot_s(drone: Drone) -> float:
-    boot_s: float = drone.autopilot.boot_s  # type: ignore[attr-defined]
+    boot_s: float = drone.autopilot.boot_s
     return boot_s
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.core.records.trajectory import Trajectory
-from app.simdrone.faults import FAULTS
+from app.simdrone.fault_kinds import FAULTS
 from bench.hazards.cases import ABORT, TUNED, Case, PlannedFault
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
 from bench.hazards.hostile_table import HAZARDS

@@ -11,7 +11,7 @@ from pymavlink.dialects.v10 import paparazzi as mavlink
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
-from app.simdrone.faults import FAULTS
+from app.simdrone.fault_kinds import FAULTS
 from app.simdrone.registry import AUTOPILOTS
 from tests.waiting import Waits
 

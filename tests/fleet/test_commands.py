@@ -17,8 +17,10 @@ from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
-from app.flights.flight_process import VehicleConnection, status_time
+from app.flights.flight_process import VehicleConnection
 from app.flights.process_messages import ConnectionOpened
+from app.flights.vehicle_status import status_time
+from app.flights.worker_part import WorkerPart
 from app.live.messages import VehicleStatus
 from app.main import create_app
 from app.vehicles.base import CheckItem, Identity
@@ -199,15 +201,15 @@ def test_a_check_keeps_every_item_it_found(client: TestClient, database: Databas
 
 
 def manager_of(database: Database, settings: Settings, *, links: bool = True) -> VehicleConnectionManager:
-    return VehicleConnectionManager(
-        database,
-        settings.data_dir,
-        AbortRegistry(),
-        lambda _shown: None,
+    part = WorkerPart(
+        database=database,
+        data_dir=settings.data_dir,
+        abort_registry=AbortRegistry(),
+        publish=lambda _shown: None,
         worker=WORKER,
         closing=threading.Event(),
-        links=links,
     )
+    return VehicleConnectionManager(part, links=links)
 
 
 FAILED = CheckItem(name="failsafe", title="FS_GCS_ENABLE", passed=False, found="off", needed="on")

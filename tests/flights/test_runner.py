@@ -27,6 +27,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.runner import FlightRunner
+from app.flights.worker_part import WorkerPart
 from app.live.messages import FlightPhase, PublishedMessage
 from app.vehicles.end_texts import end_text
 from app.vehicles.flight_end import StopRequest, withdrawn_by
@@ -46,13 +47,15 @@ class RunnerFixture:
         self.heard: list[PublishedMessage] = []
         self.watch: Watch = lambda _said: None
         self.runner = FlightRunner(
-            database,
-            settings.data_dir,
-            self.abort_registry,
-            self._hear,
-            worker="tests",
-            closing=threading.Event(),
-            clock=SimulatedClock(),
+            WorkerPart(
+                database=database,
+                data_dir=settings.data_dir,
+                abort_registry=self.abort_registry,
+                publish=self._hear,
+                worker="tests",
+                closing=threading.Event(),
+                clock=SimulatedClock(),
+            )
         )
 
     def fly_next(self) -> None:

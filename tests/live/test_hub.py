@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.db.outbox import DatabaseWatch
-from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, LiveItem, LiveState
+from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, LiveItem
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from tests.waiting import Waits
 
@@ -109,12 +109,12 @@ def test_a_stream_that_joins_late_is_told_how_the_vehicles_are_while_there_is_a_
 
 def test_what_is_told_once_more_says_how_old_it_is_so_that_a_worker_that_hangs_does_not_look_alive() -> None:
     now_s = 100.0
-    memory = LiveState(lambda: now_s)
-    memory.take(VehicleStatus(vehicle_id=5, state="connected", at="", step="record", packet_age_s=0.1))
+    hub = Hub(lambda: now_s)
+    hub.publish(VehicleStatus(vehicle_id=5, state="connected", at="", step="record", packet_age_s=0.1))
     now_s += 1.5
-    memory.take(telemetry(0.1))
+    hub.publish(telemetry(0.1))
     now_s += 2.5
-    assert [(type(one), one.age_s) for one in memory.snapshot() if not isinstance(one, FlightPhase)] == [
+    assert [(type(one), one.age_s) for one in hub.snapshot() if not isinstance(one, FlightPhase)] == [
         (VehicleStatus, 4.0), (Telemetry, 2.5)]  # fmt: skip
 
 

@@ -132,7 +132,7 @@ class ArduPilot(Copter):
 
     controller: ArduPilotController
 
-    def __init__(self, body: Body, *, system: int) -> None:
+    def __init__(self, body: Body, system: int) -> None:
         super().__init__(body, ArduPilotController(body), system=system)
 
     def tune(self) -> None:
@@ -163,7 +163,7 @@ class ArduPilot(Copter):
         return None if self.parameters[self.integral_gain] > 0.0 else f"Arm: {self.integral_gain} must be > 0"
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:  # noqa: ARG002  one number suffices
-        return next((mode for mode in self.firmware.modes if mode.custom_mode == main), None)
+        return self.mode_numbered(main)
 
     def take_off(self, param7: float) -> int:
         """Take off to `param7` metres above the place of takeoff; only from the ground, armed and in GUIDED."""
@@ -215,8 +215,6 @@ _FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0, "FENCE_ACTION": 
 """Land when the ground station is lost; stay inside the fence."""
 
 KINDS: Final = (
-    copter_kind("ardupilot", "ArduCopter up to 4.6", lambda body, system: ArduPilot(body, system=system), _FAILSAFES),
-    copter_kind(
-        "ardupilot-4.7", "ArduCopter from 4.7 on", lambda body, system: ArduPilot47(body, system=system), _FAILSAFES
-    ),
+    copter_kind("ardupilot", "ArduCopter up to 4.6", ArduPilot, _FAILSAFES),
+    copter_kind("ardupilot-4.7", "ArduCopter from 4.7 on", ArduPilot47, _FAILSAFES),
 )

@@ -6,11 +6,11 @@ hazards: it stops motors in the air on command, accepts any gain, and does not r
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Final, Self
+from functools import partial
+from typing import Final
 
-from app.autopilots.dialects import PAPARAZZI, FieldValue, Message, is_known, number, text
-from app.autopilots.paparazzi import simulated_telemetry as paparazzi_telemetry
-from app.autopilots.paparazzi.simulated_estimator import FIX_S, FallEstimator
+from app.autopilots.dialects import FieldValue, Message, is_known, number, text
+from app.autopilots.paparazzi.simulated_estimator import FIX_S
 from app.autopilots.paparazzi.simulated_plan import (
     BLOCKS,
     DESCENT_M_S,
@@ -24,10 +24,12 @@ from app.autopilots.paparazzi.simulated_plan import (
     WAYPOINTS,
     Engine,
     FlightPlan,
-    Settings,
     Vertical,
+    held,
+    setting,
+    settings,
 )
-from app.autopilots.paparazzi.simulated_telemetry import GROUND_MM
+from app.autopilots.paparazzi.simulated_telemetry import BARE_POSITION_PERIOD_S, MESSAGES, ReportingPaparazzi
 from app.autopilots.simulated.body import (
     ACCEPTED,
     ARMED,
@@ -37,10 +39,10 @@ from app.autopilots.simulated.body import (
     TICK_STEPS,
     UNSUPPORTED,
     Body,
-    OutgoingMessage,
+    Make,
     SimulatedKind,
-    Timetable,
     VerticalCommand,
+    sender,
     whole_ticks,
 )
 from app.core.control.vertical_guidance import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
@@ -57,20 +59,14 @@ _KEEP_THEIR_BLOCK: Final = (HOME, BY_HAND)
 FAILSAFE_DESCENT_M_S: Final = 1.3
 HOMING_M_S: Final = 3.0
 
-GROUND_COUNTS: Final = 25
-"""Height of the vehicle on the ground above the local origin that "Geo init" sets, 1/256 m (0.098 m)."""
-PLAN_ORIGIN_MM: Final = 146_000
-"""Altitude of the flight plan's own origin, which holds before: over a metre below the ground, so that a takeoff to a
-height in the local frame is shorter. In JSBSim one with the first gains scores 0.273 m in place of 0.323; two flights
-of the real one without "Geo init" scored 0.272 and 0.283 m in place of 0.325."""
 POSITION_AFTER_S: Final = 1.0
 """Time from the start until the position is known."""
 
-COMPONENT: Final = 190
 RECEIVE_BUFFER: Final = 256
 TRANSACTION_S: Final = 15.3
 _MAVLINK_1: Final = 0xFE
 _REAL32: Final = 9
+_BEHIND: Final = setting("", math.nan)
 _ARM_DISARM: Final = 400
 _NAV_WAYPOINT: Final = 16
 _LOCAL_ENU: Final = 4
@@ -80,7 +76,6 @@ _POLL_TICKS: Final = whole_ticks(0.018)
 _NAV_TICKS: Final = 16
 _FIX_TICKS: Final = whole_ticks(FIX_S)
 _BLOCK_TICKS: Final = whole_ticks(0.1)
-_LIST_TICKS: Final = whole_ticks(0.2)
 
 _IDLE_THRUST: Final = 500 / 9600
 _GROUNDED_S: Final = 1.0
@@ -90,42 +85,29 @@ _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
 """Time by which the reference (ζ 0.85, 100 °/s) lags behind a moving set point."""
 
 
-class Paparazzi:
-    """One autopilot from power-on; see `Autopilot`. `tuned_telemetry`: it was built with a telemetry file that sends
+class Paparazzi(ReportingPaparazzi):
+    """One autopilot from power-on. `tuned_telemetry`: it was built with a telemetry file that sends
     the position at 51 Hz; otherwise the rate is 1.25 Hz. `kill_setting`, `landed_after_s` and `max_distance_m` are as
     in its settings and its flight plan; `sends_mode`: its heartbeat contains the mode's number."""
 
     def __init__(
         self,
         body: Body,
-        *,
         system: int,
+        *,
         tuned_telemetry: bool = True,
         kill_setting: str = KILL_SETTING,
         landed_after_s: float = LANDED_AFTER_S,
         max_distance_m: float = MAX_DISTANCE_M,
         sends_mode: bool = False,
     ) -> None:
-        self.dialect = PAPARAZZI
-        self.system, self.component = system, COMPONENT
-        self.refuses_arming = False
-        self.ignores_parameters = False
-        self.took_off = False
+        super().__init__(body, settings(kill_setting), system=system, sends_mode=sends_mode)
         self.position_after_s = POSITION_AFTER_S
-        self._origin_mm = PLAN_ORIGIN_MM
-        self._home_m = 0.0
-        self._body = body
-        self._codec = PAPARAZZI.codec(system=system, component=COMPONENT)
         self._radio = _Radio()
-        self._ticks = 0
         self._kill_setting = kill_setting
-        self._settings = Settings(kill_setting)
         self._plan = FlightPlan(landed_after_s=landed_after_s)
         self._max_distance_m = max_distance_m
-        self._sends_mode = sends_mode
-        self._motors_on = False
         self._reported_seq: int | None = None
-        self._listing: int | None = None
         self._transaction_ends_s = 0.0
         self._idle_s = 0.0
         self._thrust_s = 0.0
@@ -133,11 +115,8 @@ class Paparazzi:
         self._touched_s: float | None = None
         self._touched_m = 0.0
         self._held_m = 0.0
-        self._estimator = FallEstimator()
-        self._timetable = Timetable.from_periods(paparazzi_telemetry.PERIODS_S)
         if not tuned_telemetry:
-            self._timetable.set("LOCAL_POSITION_NED", paparazzi_telemetry.BARE_POSITION_PERIOD_S)
-        self._out: list[OutgoingMessage] = []
+            self.report_every("LOCAL_POSITION_NED", BARE_POSITION_PERIOD_S)
         self._set_motors(on=False)
 
     # ------------------------------------------------------------ time
@@ -145,54 +124,17 @@ class Paparazzi:
     def receive(self, data: bytes) -> None:
         self._radio.put(data)
 
-    def restore_persistent(self, before: Self) -> None:
-        """Copy nothing: its settings are compiled in."""
-
-    def tick(self) -> list[OutgoingMessage]:
-        self._ticks += 1
+    def advance(self) -> None:
         if self._ticks % _POLL_TICKS == 0:
             self._listen()
         if self._ticks % _NAV_TICKS == 0:
             self._navigate()
         command = self._command()
-        self._body.advance(TICK_STEPS, command)
+        self.body.advance(TICK_STEPS, command)
         if self._ticks % _FIX_TICKS == 0:
-            is_driven = command is not MOTORS_OFF and not self._body.motors_dead
-            self._estimator.fix(self._body.altitude_m, self._body.climb_rate_m_s, is_driven=is_driven)
+            is_driven = command is not MOTORS_OFF and not self.body.motors_dead
+            self.estimator.fix(self.body.altitude_m, self.body.climb_rate_m_s, is_driven=is_driven)
         self._watch_thrust()
-        self._report()
-        out, self._out = self._out, []
-        return out
-
-    @property
-    def boot_s(self) -> float:
-        return self._ticks * TICK_S
-
-    @property
-    def _ground_counts(self) -> int:
-        """Height of the standing vehicle in the local frame, 1/256 m."""
-        return GROUND_COUNTS + fix((GROUND_MM - self._origin_mm) / 1000.0, POSITION_BITS)
-
-    @property
-    def height_m(self) -> float:
-        """Height in the local frame, up."""
-        return self._body.altitude_m + self._ground_counts / (1 << POSITION_BITS)
-
-    @property
-    def north_m(self) -> float:
-        """Position in the local frame, whose origin is HOME."""
-        return self._body.north_m - self._home_m
-
-    @property
-    def mode(self) -> int:
-        return self._settings.count("aut_mod")
-
-    @property
-    def armed(self) -> bool:
-        return self._motors_on
-
-    def held(self, parameter: str) -> float:
-        return self._settings[parameter]
 
     # ------------------------------------------------------------ flying
 
@@ -209,29 +151,24 @@ class Paparazzi:
 
     def kill(self) -> None:
         self._set_motors(on=False)
-        if (place := self._settings.find(self._kill_setting)) is not None:
-            self._send_setting(place)
+        if (place := self.parameters.place(self._kill_setting)) is not None:
+            self.send_parameter(place)
 
     def fly_home(self) -> None:
         self._set_mode(HOME)
 
     def _set_motors(self, *, on: bool) -> None:
-        self._motors_on = on and self.mode != KILL and not self.refuses_arming
+        self.armed = on and self.mode != KILL and not self.refuses_arming
         if self._kill_setting:
-            self._settings[self._kill_setting] = 0.0 if self._motors_on else 1.0
+            self.parameters[self._kill_setting] = 0.0 if self.armed else 1.0
 
     def _set_mode(self, mode: int) -> None:
         """Set the mode; modes that the airframe does not have are ignored."""
         if mode not in MODES:
             return
-        self._settings["aut_mod"] = mode
+        self.parameters["aut_mod"] = mode
         if mode == KILL:
             self._set_motors(on=False)
-
-    def _refer_to_ground(self) -> None:
-        """Move the local origin to the present place."""
-        self._origin_mm = GROUND_MM + round(self._body.altitude_m * 1000.0)
-        self._home_m = self._body.north_m
 
     def _enter(self, seq: int) -> None:
         self._plan.enter(seq, self.height_m)
@@ -246,7 +183,7 @@ class Paparazzi:
         distance_m = abs(self.north_m)
         if self.mode == NAV and distance_m > self._max_distance_m:
             self._set_mode(HOME)
-        self._body.steered_m_s = -self._homing_m_s() if self.mode == HOME else 0.0
+        self.body.steered_m_s = -self._homing_m_s() if self.mode == HOME else 0.0
         if self.mode in _WITHOUT_PLAN:
             return
         has_position = self.boot_s >= self.position_after_s
@@ -255,7 +192,7 @@ class Paparazzi:
         )
         if following is not None:
             if self._plan.seq == GEO_INIT:
-                self._refer_to_ground()
+                self.refer_to_ground()
             self._enter(following)
 
     def _homing_m_s(self) -> float:
@@ -285,7 +222,7 @@ class Paparazzi:
         """Return the command to descend at a constant rate. On the ground the reference continues below the vehicle,
         which the replica's climb mode (of an older version) prevents, so that the thrust fades as in the recorded
         landings."""
-        if self._touched_s is None and self._body.altitude_m < _TOUCHES_BELOW_M:
+        if self._touched_s is None and self.body.altitude_m < _TOUCHES_BELOW_M:
             self._touched_s, self._touched_m = self.boot_s, self.height_m
         if self._touched_s is None:
             return self._vertical(CLIMB, fix(-DESCENT_M_S, SPEED_BITS))
@@ -294,66 +231,37 @@ class Paparazzi:
 
     def _altitude(self, target_m: float) -> VerticalCommand:
         """Return the command to an altitude in the local frame, converted to the body's origin, the ground."""
-        return self._vertical(ALT, fix(target_m, POSITION_BITS) - self._ground_counts)
+        return self._vertical(ALT, fix(target_m, POSITION_BITS) - self.ground_counts)
 
     def _vertical(self, mode: int, target: int) -> VerticalCommand:
-        kp, ki, kd = (self._settings.count(f"gui_v_{name}") for name in ("kp", "ki", "kd"))
+        kp, ki, kd = (int(self.parameters[f"gui_v_{name}"]) for name in ("kp", "ki", "kd"))
         return VerticalCommand(mode, target, kp, ki, kd)
 
     def _watch_thrust(self) -> None:
         """Update whether it counts as flying: thrust above idle, or not, for a second."""
-        pushes = self._body.thrust > _IDLE_THRUST
+        pushes = self.body.thrust > _IDLE_THRUST
         self._thrust_s = self._thrust_s + TICK_S if pushes else 0.0
         self._idle_s = 0.0 if pushes else self._idle_s + TICK_S
         if self._thrust_s >= _FLYING_S:
             self._flies = True
-        elif self._body.is_resting or self._idle_s >= _GROUNDED_S:
+        elif self.body.is_resting or self._idle_s >= _GROUNDED_S:
             self._flies = False
 
     # ------------------------------------------------------------ sending
 
-    def _report(self) -> None:
-        if self._listing is not None and self._ticks % _LIST_TICKS == 0:
-            self._send_setting(self._listing)
-            self._listing = self._listing + 1 if self._listing + 1 < len(self._settings) else None
+    def report(self, due: list[str]) -> None:
         if self._ticks % _BLOCK_TICKS == 0 and self._plan.seq != self._reported_seq:
             self._reported_seq = self._plan.seq
-            self._send("SCRIPT_CURRENT", counter="mission", seq=self._plan.seq)
-        due = self._timetable.due(self._ticks)
-        if due:
-            now = self._snapshot()
-            self._out += [OutgoingMessage(kind, paparazzi_telemetry.MESSAGES[kind](now)) for kind in due]
+            self._send("SCRIPT_CURRENT", {"seq": self._plan.seq}, "mission")
+        for kind in due:
+            self._send(kind, MESSAGES[kind](self))
 
-    def _snapshot(self) -> paparazzi_telemetry.Snapshot:
-        body = self._body
-        return paparazzi_telemetry.Snapshot(
-            boot_s=self.boot_s,
-            height_m=self.height_m + self._estimator.error_m,
-            climb_rate_m_s=self._estimator.climb_rate_m_s(body.climb_rate_m_s),
-            thrust=body.thrust,
-            battery_v=body.battery_v,
-            mode=self.mode,
-            motors_on=self.armed,
-            origin_mm=self._origin_mm,
-            north_m=self.north_m,
-            north_m_s=body.north_m_s,
-            sends_mode=self._sends_mode,
-        )
-
-    def _send(self, kind: str, *, counter: str = "", **fields: FieldValue) -> None:
-        self._out.append(OutgoingMessage(kind, fields, counter))
-
-    def _send_setting(self, index: int) -> None:
-        """Send a setting; an index past the end sends what is behind the table, as the real one does."""
-        name, value = self._settings.at(index) if index < len(self._settings) else ("", math.nan)
-        self._send(
-            "PARAM_VALUE",
-            param_id=name,
-            param_value=value,
-            param_type=_REAL32,
-            param_count=len(self._settings),
-            param_index=index,
-        )
+    def send_parameter(self, place: int) -> None:
+        """Send a setting; a place past the end sends what is behind the table, as the real one does."""
+        count = len(self.parameters)
+        known, value = self.parameters.at(place) if place < count else (_BEHIND, math.nan)
+        fields: dict[str, FieldValue] = {"param_id": known.name, "param_value": value, "param_count": count}
+        self._send("PARAM_VALUE", {**fields, "param_type": _REAL32, "param_index": place})
 
     # ------------------------------------------------------------ receiving
 
@@ -365,36 +273,27 @@ class Paparazzi:
             if handler is not None and number(message, "target_system") == self.system:
                 handler(self, message)
 
-    def _on_param_list(self, _message: Message) -> None:
-        self._listing = 0
-
-    def _on_param_read(self, message: Message) -> None:
-        index = int(number(message, "param_index"))
-        place = self._settings.find(text(message, "param_id")) if index < 0 else index
-        if place is not None:
-            self._send_setting(place)
-
     def _on_param_set(self, message: Message) -> None:
         """Set a parameter; wrong types, NaN and unknown names have no reply."""
         name, value = text(message, "param_id"), number(message, "param_value")
-        place = self._settings.find(name)
+        place = self.parameters.place(name)
         if place is None or self.ignores_parameters or math.isnan(value):
             return
         if number(message, "param_type") != _REAL32:
             return
-        self._set(name, value)
-        self._send_setting(place)
+        self._set(place, name, value)
+        self.send_parameter(place)
 
-    def _set(self, name: str, value: float) -> None:
+    def _set(self, place: int, name: str, value: float) -> None:
         match name:
             case "aut_mod":
                 self._set_mode(math.trunc(value) if math.isfinite(value) else -1)
             case _ if name == self._kill_setting:
                 self._set_motors(on=math.isfinite(value) and math.trunc(value) == 0)
             case _:
-                self._settings[name] = value
+                self.parameters[name] = held(self.parameters.at(place)[0].kind, value)
         if name == "gui_v_ki":
-            self._body.forget_error_sum()
+            self.body.forget_error_sum()
 
     def _on_command(self, message: Message) -> None:
         command, param1 = int(number(message, "command")), number(message, "param1")
@@ -403,24 +302,25 @@ class Paparazzi:
             wanted = param1 > 0.5
             self._set_motors(on=wanted)
             result = ACCEPTED if self.armed == wanted else FAILED
-        self._send("COMMAND_ACK", command=command, result=result)
+        self._send("COMMAND_ACK", {"command": command, "result": result})
 
     def _on_set_mode(self, message: Message) -> None:
         self._set_motors(on=bool(int(number(message, "base_mode")) & ARMED))
 
     def _on_data_stream(self, message: Message) -> None:
-        self._send("DATA_STREAM", stream_id=int(number(message, "req_stream_id")), message_rate=0, on_off=0)
+        stream = int(number(message, "req_stream_id"))
+        self._send("DATA_STREAM", {"stream_id": stream, "message_rate": 0, "on_off": 0})
 
     def _on_block_list(self, message: Message) -> None:
         self._begin_transaction()
-        self._send("SCRIPT_COUNT", counter="blocks", count=len(BLOCKS), **_sender(message))
+        self._send("SCRIPT_COUNT", {"count": len(BLOCKS), **sender(message)}, "blocks")
 
     def _on_block_request(self, message: Message) -> None:
         seq = int(number(message, "seq"))
         if not self._is_listing_blocks or seq >= len(BLOCKS):
             return
         self._begin_transaction()
-        self._send("SCRIPT_ITEM", counter="blocks", seq=seq, name=BLOCKS[seq].name, **_sender(message))
+        self._send("SCRIPT_ITEM", {"seq": seq, "name": BLOCKS[seq].name, **sender(message)}, "blocks")
 
     def _on_block(self, message: Message) -> None:
         """Enter a block, unless the list is being read or no block is flown; there is no reply in any case."""
@@ -436,7 +336,7 @@ class Paparazzi:
         if not is_waypoint or seq >= len(WAYPOINTS) or not abs(height_m) <= _HIGHEST_M:
             return
         self._plan.altitudes_m[WAYPOINTS[seq]] = height_m
-        self._send("MISSION_ACK", counter="mission", type=0, **_sender(message))
+        self._send("MISSION_ACK", {"type": 0, **sender(message)}, "mission")
 
     @property
     def _is_listing_blocks(self) -> bool:
@@ -466,11 +366,6 @@ class _Radio:
         return data
 
 
-def _sender(message: Message) -> dict[str, int]:
-    """Return the target of a reply."""
-    return {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
-
-
 _HANDLERS: Final[Mapping[str, Callable[[Paparazzi, Message], None]]] = {
     "PARAM_REQUEST_LIST": Paparazzi._on_param_list,
     "PARAM_REQUEST_READ": Paparazzi._on_param_read,
@@ -486,24 +381,20 @@ _HANDLERS: Final[Mapping[str, Callable[[Paparazzi, Message], None]]] = {
 }
 
 
-def _kind(name: str, title: str, make: Callable[[Body, int], Paparazzi]) -> SimulatedKind:
+def _kind(name: str, title: str, make: Make) -> SimulatedKind:
     return SimulatedKind(name=name, title=title, system=31, link="udp:127.0.0.1:4244@4245", make=make, set_up=make)
 
 
 KINDS: Final = (
-    _kind(
-        "paparazzi",
-        "Paparazzi with a telemetry file for tuning",
-        lambda body, system: Paparazzi(body, system=system),
-    ),
+    _kind("paparazzi", "Paparazzi with a telemetry file for tuning", Paparazzi),
     _kind(
         "paparazzi-bare",
         "Paparazzi as built by default: position at 1.25 Hz",
-        lambda body, system: Paparazzi(body, system=system, tuned_telemetry=False),
+        partial(Paparazzi, tuned_telemetry=False),
     ),
     _kind(
         "paparazzi-5.10",
         "Paparazzi of 2017, in which the setting that stops the throttle has another name",
-        lambda body, system: Paparazzi(body, system=system, kill_setting=NEWER_KILL_SETTING),
+        partial(Paparazzi, kill_setting=NEWER_KILL_SETTING),
     ),
 )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from app.autopilots.simulated.copter_parameters import Kind, Parameter, Parameters
 from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 
 DESCENT_M_S: Final = 0.8
@@ -139,127 +140,100 @@ NEWER_KILL_SETTING: Final = "aut_kil_thr"
 """Name in a source tree of 2017 (version 5.10), in which the variables are in one structure."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """One setting; an integer default marks an integer in the autopilot, to which values are truncated."""
-
-    name: str
-    default: int | float
-
-    def held(self, value: float) -> float:
-        """Return `value` as held in the autopilot's variable."""
-        if isinstance(self.default, float):
-            return value
-        return float(min(max(math.trunc(value), INT32_MIN), INT32_MAX)) if math.isfinite(value) else float(INT32_MIN)
+def setting(name: str, default: int | float) -> Parameter:
+    """A setting; an integer default marks an integer in the autopilot, to which values are truncated."""
+    return Parameter(name, Kind.INT32 if isinstance(default, int) else Kind.REAL32, float(default))
 
 
-class Settings:
-    """Values of the settings, initially the defaults."""
+def held(kind: Kind, value: float) -> float:
+    """Return a value as held in the autopilot's variable."""
+    if kind is Kind.REAL32:
+        return value
+    return float(min(max(math.trunc(value), INT32_MIN), INT32_MAX)) if math.isfinite(value) else float(INT32_MIN)
 
-    def __init__(self, kill_setting: str) -> None:
-        """`kill_setting` is this release's name of the setting that stops the throttle; empty if there is none."""
-        named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
-        self._settings = tuple(setting for setting in named if setting.name)
-        self._values: list[float] = [float(setting.default) for setting in self._settings]
-        self._places = {setting.name: place for place, setting in reversed(list(enumerate(self._settings)))}
 
-    def __len__(self) -> int:
-        return len(self._settings)
-
-    def __getitem__(self, name: str) -> float:
-        return self._values[self._places[name]]
-
-    def __setitem__(self, name: str, value: float) -> None:
-        place = self._places[name]
-        self._values[place] = self._settings[place].held(value)
-
-    def count(self, name: str) -> int:
-        """Return a setting that is an integer in the autopilot."""
-        return int(self[name])
-
-    def at(self, index: int) -> tuple[str, float]:
-        return self._settings[index].name, self._values[index]
-
-    def find(self, name: str) -> int | None:
-        """Return the place of the first setting with this name, if any; case-sensitive."""
-        return self._places.get(name) if len(name) < NAME_LIMIT else None
+def settings(kill_setting: str) -> Parameters:
+    """Return the settings with their values after the start; `kill_setting` is this release's name of the one that
+    stops the throttle, empty if there is none."""
+    named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
+    return Parameters([each for each in named if each.name], longest_name=NAME_LIMIT - 1)
 
 
 SETTINGS: Final = (
-    Setting("tel_mod_Mav", 0),
-    Setting("tel_mod_Mai", 0),
-    Setting("aut_mod_aut", 13),
-    Setting(KILL_SETTING, 1),
-    Setting("aut_pow_swi", 0),
-    Setting("aut_mod", 13),
-    Setting("gui_v_kp", 283),
-    Setting("gui_v_kd", 82),
-    Setting("gui_v_ki", 13),
-    Setting("gui_v_nom_thr", 0.655),
-    Setting("gui_v_ada_thr_en", 0),
-    Setting("gui_v_z_sp", -23),
-    Setting("gui_h_use_ref", 1),
-    Setting("gh_ref_max_spe", 5.0),
-    Setting("gui_h_app_for_by", 0.0),
-    Setting("gh_ref_tau", 0.5),
-    Setting("gh_ref_ome", 1.169371),
-    Setting("gh_ref_zet", 0.85),
-    Setting("gui_h_gai_p", 79),
-    Setting("gui_h_gai_d", 100),
-    Setting("gui_h_gai_i", 30),
-    Setting("gui_h_gai_v", 0),
-    Setting("gui_h_gai_a", 0),
-    Setting("gui_h_sp_pos_x", 0),
-    Setting("gui_h_sp_pos_y", 0),
-    Setting("fli_alt", 149.0),
-    Setting("nav_hea", 31),
-    Setting("nav_rad", 5.0),
-    Setting("nav_cli_vsp", 0.5),
-    Setting("nav_des_vsp", -0.8),
-    Setting("sta_gai_p_x", 850),
-    Setting("sta_gai_d_x", 425),
-    Setting("sta_gai_i_x", 0),
-    Setting("sta_gai_dd_x", 0),
-    Setting("sta_gai_p_y", 850),
-    Setting("sta_gai_d_y", 425),
-    Setting("sta_gai_i_y", 0),
-    Setting("sta_gai_dd_y", 0),
-    Setting("sta_gai_p_z", 1000),
-    Setting("sta_gai_d_z", 700),
-    Setting("sta_gai_i_z", 0),
-    Setting("sta_gai_dd_z", 100),
-    Setting("att_ref_qua_i_mo", 7.853981),
-    Setting("att_ref_qua_i_mo", 0.9),
-    Setting("att_ref_qua_i_mo", 7.853981),
-    Setting("att_ref_qua_i_mo", 0.9),
-    Setting("att_ref_qua_i_mo", 3.490659),
-    Setting("att_ref_qua_i_mo", 0.9),
-    Setting("nps_byp_ahr", 0),
-    Setting("nps_byp_ins", 0),
-    Setting("gps_has_fix", 1),
-    Setting("dat_ena", 1),
-    Setting("nps_ele_sup_vol", 12.4),
-    Setting("nps_atm_win_spe", 0.0),
-    Setting("nps_atm_win_dir", 0.0),
-    Setting("nps_atm_tur_sev", 0.0),
-    Setting("imu_bod_to_imu_e", 0.0),
-    Setting("imu_bod_to_imu_e", 0.0),
-    Setting("imu_bod_to_imu_e", 0.0),
-    Setting("imu_b2i_set_cur", 0),
-    Setting("mul_gps_mod", 0),
-    Setting("ahr_icq_gra_heu_", 30),
-    Setting("ahr_icq_acc_ome", 0.063),
-    Setting("ahr_icq_acc_zet", 0.9),
-    Setting("ahr_icq_mag_ome", 0.04),
-    Setting("ahr_icq_mag_zet", 0.9),
-    Setting("air_dat_qnh", 1013.315),
-    Setting("air_dat_tas_fac", 1.0),
-    Setting("air_dat_cal_qnh_", 0),
-    Setting("air_dat_cal_air", 1),
-    Setting("air_dat_cal_tas_", 1),
-    Setting("air_dat_cal_ams_", 0),
-    Setting("geo_mag_cal_onc", 0),
-    Setting("gps_nps_gps_nps_", 1),
-    Setting("dat_mav_per_sta", 1),
-    Setting("dat_mav_per_tel_", 1),
+    setting("tel_mod_Mav", 0),
+    setting("tel_mod_Mai", 0),
+    setting("aut_mod_aut", 13),
+    setting(KILL_SETTING, 1),
+    setting("aut_pow_swi", 0),
+    setting("aut_mod", 13),
+    setting("gui_v_kp", 283),
+    setting("gui_v_kd", 82),
+    setting("gui_v_ki", 13),
+    setting("gui_v_nom_thr", 0.655),
+    setting("gui_v_ada_thr_en", 0),
+    setting("gui_v_z_sp", -23),
+    setting("gui_h_use_ref", 1),
+    setting("gh_ref_max_spe", 5.0),
+    setting("gui_h_app_for_by", 0.0),
+    setting("gh_ref_tau", 0.5),
+    setting("gh_ref_ome", 1.169371),
+    setting("gh_ref_zet", 0.85),
+    setting("gui_h_gai_p", 79),
+    setting("gui_h_gai_d", 100),
+    setting("gui_h_gai_i", 30),
+    setting("gui_h_gai_v", 0),
+    setting("gui_h_gai_a", 0),
+    setting("gui_h_sp_pos_x", 0),
+    setting("gui_h_sp_pos_y", 0),
+    setting("fli_alt", 149.0),
+    setting("nav_hea", 31),
+    setting("nav_rad", 5.0),
+    setting("nav_cli_vsp", 0.5),
+    setting("nav_des_vsp", -0.8),
+    setting("sta_gai_p_x", 850),
+    setting("sta_gai_d_x", 425),
+    setting("sta_gai_i_x", 0),
+    setting("sta_gai_dd_x", 0),
+    setting("sta_gai_p_y", 850),
+    setting("sta_gai_d_y", 425),
+    setting("sta_gai_i_y", 0),
+    setting("sta_gai_dd_y", 0),
+    setting("sta_gai_p_z", 1000),
+    setting("sta_gai_d_z", 700),
+    setting("sta_gai_i_z", 0),
+    setting("sta_gai_dd_z", 100),
+    setting("att_ref_qua_i_mo", 7.853981),
+    setting("att_ref_qua_i_mo", 0.9),
+    setting("att_ref_qua_i_mo", 7.853981),
+    setting("att_ref_qua_i_mo", 0.9),
+    setting("att_ref_qua_i_mo", 3.490659),
+    setting("att_ref_qua_i_mo", 0.9),
+    setting("nps_byp_ahr", 0),
+    setting("nps_byp_ins", 0),
+    setting("gps_has_fix", 1),
+    setting("dat_ena", 1),
+    setting("nps_ele_sup_vol", 12.4),
+    setting("nps_atm_win_spe", 0.0),
+    setting("nps_atm_win_dir", 0.0),
+    setting("nps_atm_tur_sev", 0.0),
+    setting("imu_bod_to_imu_e", 0.0),
+    setting("imu_bod_to_imu_e", 0.0),
+    setting("imu_bod_to_imu_e", 0.0),
+    setting("imu_b2i_set_cur", 0),
+    setting("mul_gps_mod", 0),
+    setting("ahr_icq_gra_heu_", 30),
+    setting("ahr_icq_acc_ome", 0.063),
+    setting("ahr_icq_acc_zet", 0.9),
+    setting("ahr_icq_mag_ome", 0.04),
+    setting("ahr_icq_mag_zet", 0.9),
+    setting("air_dat_qnh", 1013.315),
+    setting("air_dat_tas_fac", 1.0),
+    setting("air_dat_cal_qnh_", 0),
+    setting("air_dat_cal_air", 1),
+    setting("air_dat_cal_tas_", 1),
+    setting("air_dat_cal_ams_", 0),
+    setting("geo_mag_cal_onc", 0),
+    setting("gps_nps_gps_nps_", 1),
+    setting("dat_mav_per_sta", 1),
+    setting("dat_mav_per_tel_", 1),
 )

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import ClassVar, Final
 
-from app.autopilots.dialects import COMMON
+from app.autopilots.dialects import COMMON, FieldValue
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
 from app.autopilots.px4.replica import parameters as loop
 from app.autopilots.px4.simulated_control import Px4Controller
@@ -144,7 +144,7 @@ class Px4(Copter):
 
     controller: Px4Controller
 
-    def __init__(self, body: Body, *, system: int) -> None:
+    def __init__(self, body: Body, system: int) -> None:
         defaults = {parameter.name: parameter.default for parameter in self.firmware.parameters}
         super().__init__(body, Px4Controller(body, defaults, ground_m=self.firmware.ground_m), system=system)
         self._streamed_s = self._stream_began_s = -math.inf
@@ -202,21 +202,16 @@ class Px4(Copter):
 
     def _send_event(self, number: int, *arguments: int, layout: str, levels: int = _PROTOCOL) -> None:
         """Send an event as a broadcast."""
-        packed = struct.pack(layout, *arguments)
-        self._out.append(
-            OutgoingMessage(
-                "EVENT",
-                {
-                    "id": number,
-                    "event_time_boot_ms": int(self.boot_s * 1000.0),
-                    "sequence": self._events % _SEQUENCE_NUMBERS,
-                    "destination_component": 0,
-                    "destination_system": 0,
-                    "log_levels": levels,
-                    "arguments": packed.ljust(_ARGUMENTS, b"\0"),
-                },
-            )
-        )
+        fields: dict[str, FieldValue] = {
+            "id": number,
+            "event_time_boot_ms": self.boot_ms,
+            "sequence": self._events % _SEQUENCE_NUMBERS,
+            "destination_component": 0,
+            "destination_system": 0,
+            "log_levels": levels,
+            "arguments": struct.pack(layout, *arguments).ljust(_ARGUMENTS, b"\0"),
+        }
+        self._send("EVENT", fields)
         self._events += 1
 
     def tune(self) -> None:
@@ -225,8 +220,7 @@ class Px4(Copter):
             self.controller.tune(self.parameters.values())
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:
-        wanted = custom_mode(max(main, 0), max(sub, 0))
-        return next((mode for mode in self.firmware.modes if mode.custom_mode == wanted), None)
+        return self.mode_numbered(custom_mode(max(main, 0), max(sub, 0)))
 
     def mode_refusal(self, mode: FlightMode) -> str | None:
         """Refuse OFFBOARD without a stream of set points."""
@@ -292,4 +286,4 @@ _FAILSAFES: Final = {
     "COM_OBL_RC_ACT": 4.0,  # land without set points
 }
 
-KINDS: Final = (copter_kind("px4", "PX4", lambda body, system: Px4(body, system=system), _FAILSAFES),)
+KINDS: Final = (copter_kind("px4", "PX4", Px4, _FAILSAFES),)

@@ -1,12 +1,14 @@
-"""The body of a simulated drone, which persists between flights and falls if its motors stop in the air, and the
-interface and kinds of the autopilots that fly it.
+"""The body of a simulated drone, which persists between flights and falls if its motors stop in the air, and what the
+autopilots that fly it share: their time, parameters and reports.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Final, NamedTuple, Protocol, Self
+from dataclasses import dataclass
+from typing import ClassVar, Final, NamedTuple, Protocol, Self
 
-from app.autopilots.dialects import Dialect, FieldValue
+from app.autopilots.dialects import Dialect, FieldValue, Message, number, text
+from app.autopilots.simulated.copter_parameters import Parameters
 from app.core.control.vertical_guidance import RATE_HZ, THROTTLE
 
 TICK_STEPS: Final = 2
@@ -134,74 +136,139 @@ class OutgoingMessage:
     system: int | None = None
 
 
-class SimulatedAutopilot(Protocol):
-    """A simulated autopilot: it flies its body, receives bytes and returns messages to send. Its time is counted in
-    ticks since it was switched on."""
+class SimulatedAutopilot(ABC):
+    """A simulated autopilot from switching on: it flies its body, receives bytes and returns messages to send. Its time
+    is counted in ticks since then.
 
-    dialect: Dialect
-    system: int
-    component: int
-    refuses_arming: bool
-    """Fault: arming is refused as this autopilot does it."""
-    ignores_parameters: bool
-    """Fault: PARAM_SET changes nothing and has no reply."""
-    took_off: bool
-    """Whether a takeoff has been commanded."""
+    Faults: with `refuses_arming` it refuses to arm in its own way, with `ignores_parameters` PARAM_SET changes nothing
+    and has no reply. `took_off`: a takeoff has been commanded.
+    """
+
+    component: ClassVar[int]
+    list_ticks: ClassVar[int]
+    """Interval of the parameters in a list."""
+
+    def __init__(
+        self, body: Body, dialect: Dialect, parameters: Parameters, periods_s: Mapping[str, float], *, system: int
+    ) -> None:
+        """`periods_s` are those of the reports that it sends unrequested."""
+        self.dialect = dialect
+        self.system = system
+        self.body = body
+        self.parameters = parameters
+        self.refuses_arming = self.ignores_parameters = self.took_off = self.armed = False
+        self._codec = dialect.codec(system=system, component=self.component)
+        self._ticks = 0
+        self._listing: int | None = None
+        self._every: dict[str, int] = {}
+        self._out: list[OutgoingMessage] = []
+        for kind, period_s in periods_s.items():
+            self.report_every(kind, period_s)
 
     @property
-    def armed(self) -> bool: ...
-
-    @property
+    @abstractmethod
     def is_by_hand(self) -> bool:
         """Whether it is in the mode in which a pilot flies it."""
 
-    def held(self, parameter: str) -> float:
-        """Return the true value of a parameter, whatever was sent. Raises KeyError for an unknown name."""
-
+    @abstractmethod
     def receive(self, data: bytes) -> None:
         """Process bytes received by the radio."""
 
+    @abstractmethod
     def take_over(self) -> None:
         """Switch to the pilot's mode, in which a pilot holds it in place."""
 
+    @abstractmethod
     def hand_back(self) -> None:
         """Switch back from the pilot's mode to the automatic one."""
 
+    @abstractmethod
     def kill(self) -> None:
         """Stop the motors, at any height, as another ground station commands."""
 
+    @abstractmethod
     def fly_home(self) -> None:
         """Enter the mode in which it flies home by itself."""
 
-    def restore_persistent(self, before: Self) -> None:
-        """Copy what survives a reboot from the autopilot before it."""
+    @abstractmethod
+    def advance(self) -> None:
+        """Process received messages, and fly the body for a tick."""
+
+    @abstractmethod
+    def report(self, due: list[str]) -> None:
+        """Send these reports, and others that are due."""
+
+    @abstractmethod
+    def send_parameter(self, place: int) -> None:
+        """Send the parameter at this place in the list."""
+
+    def restore_persistent(self, _before: Self) -> None:  # noqa: B027 - not every autopilot keeps something
+        """Copy what survives a reboot from the autopilot before it; nothing if its parameters are compiled in."""
+
+    @property
+    def boot_s(self) -> float:
+        return self._ticks * TICK_S
+
+    @property
+    def boot_ms(self) -> int:
+        return int(self.boot_s * 1000.0)
+
+    def held(self, parameter: str) -> float:
+        """Return the true value of a parameter, whatever was sent. Raises KeyError for an unknown name."""
+        return self.parameters[parameter]
 
     def tick(self) -> list[OutgoingMessage]:
-        """Advance by one tick of TICK_S: process received messages, fly the body, and return the messages to send."""
+        """Advance by one tick of TICK_S; return the messages to send."""
+        self._ticks += 1
+        self.advance()
+        if self._listing is not None and self._ticks % self.list_ticks == 0:
+            self.send_parameter(self._listing)
+            self._listing = self._listing + 1 if self._listing + 1 < len(self.parameters) else None
+        self.report([kind for kind, ticks in self._every.items() if self._ticks % ticks == 0])
+        out, self._out = self._out, []
+        return out
 
-
-@dataclass(slots=True)
-class Timetable:
-    """Schedule of telemetry at fixed periods, rounded down to whole ticks."""
-
-    ticks: dict[str, int] = field(default_factory=dict)
-
-    @classmethod
-    def from_periods(cls, periods_s: Mapping[str, float]) -> "Timetable":
-        table = cls()
-        for kind, period_s in periods_s.items():
-            table.set(kind, period_s)
-        return table
-
-    def set(self, kind: str, period_s: float) -> None:
-        """Send `kind` every `period_s` seconds from now on; never if 0 or less."""
+    def report_every(self, kind: str, period_s: float) -> None:
+        """Send a report every `period_s` seconds from now on, rounded down to whole ticks; never if 0 or less."""
         if period_s > 0.0:
-            self.ticks[kind] = whole_ticks(period_s)
+            self._every[kind] = whole_ticks(period_s)
         else:
-            self.ticks.pop(kind, None)
+            self._every.pop(kind, None)
 
-    def due(self, tick: int) -> list[str]:
-        return [kind for kind, period in self.ticks.items() if tick % period == 0]
+    def _send(self, kind: str, fields: Fields, counter: str = "") -> None:
+        self._out.append(OutgoingMessage(kind, fields, counter))
+
+    def _on_param_list(self, _message: Message) -> None:
+        self._listing = 0
+
+    def _on_param_read(self, message: Message) -> None:
+        """Send a parameter; a request for an unknown one has no reply."""
+        index = int(number(message, "param_index"))
+        place = self.parameters.place(text(message, "param_id")) if index < 0 else index
+        if place is not None:
+            self.send_parameter(place)
+
+
+def attitude(now: SimulatedAutopilot) -> Fields:
+    """Return ATTITUDE, which is level."""
+    still = dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
+    return {"time_boot_ms": now.boot_ms, **still}
+
+
+def system_time(now: SimulatedAutopilot) -> Fields:
+    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
+
+
+def version(flight_software: int, *, capabilities: int = 0, uid: int = 0) -> Fields:
+    """Return AUTOPILOT_VERSION."""
+    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
+    others = dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0)
+    return {"capabilities": capabilities, "flight_sw_version": flight_software, "uid": uid, **others, **custom}
+
+
+def sender(message: Message) -> dict[str, int]:
+    """Return the target of a reply."""
+    return {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
 
 
 def whole_ticks(seconds: float) -> int:

@@ -1,45 +1,32 @@
 """MAVLink 2 services common to ArduPilot and PX4: parameters, commands, modes, rates, failsafes."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import ClassVar, Final, Self
+from typing import Final, Self
 
 from app.autopilots.dialects import FieldValue, Message, is_known, number, text
-from app.autopilots.simulated import copter_telemetry
 from app.autopilots.simulated.body import (
     ACCEPTED,
     FAILED,
     TEMPORARILY_REJECTED,
-    TICK_S,
     UNSUPPORTED,
     Body,
-    OutgoingMessage,
     SimulatedKind,
-    Timetable,
+    sender,
     whole_ticks,
 )
 from app.autopilots.simulated.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
-from app.autopilots.simulated.copter_parameters import Behaviour, FirmwareProfile, FlightMode, Parameters, Reaction
+from app.autopilots.simulated.copter_parameters import Behaviour, FlightMode, Reaction
+from app.autopilots.simulated.copter_telemetry import REPORTS, ReportingCopter
 
-COMPONENT: Final = 1
 FORCE: Final = 21196
 """Second parameter of command 400 that makes it unconditional."""
 
-ESTIMATE_AFTER_S: Final = 3.0
-"""Time from the start until the position is known well enough to arm and to be sent."""
 _ESTIMATED: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
 _CONTROLLED: Final = frozenset({"ATTITUDE_TARGET", "NAV_CONTROLLER_OUTPUT", "POSITION_TARGET_LOCAL_NED"})
 """Sent only while the altitude controller runs."""
-_SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
-"""Hardware id of a simulated drone, except its last byte."""
 _GROUND_STATION: Final = 6
-_LIST_EVERY_TICKS: Final = 2
 _REPORT_TICKS: Final = whole_ticks(30.0)
-_TEXT_LENGTH: Final = 50
-_LAST_TEXT: Final = 65535
-_ACTIVE: Final = 4
-_STANDBY: Final = 3
-_ALTITUDE_BREACH: Final = 2
 _CUSTOM_MODE: Final = 1
 
 # MAV_CMD
@@ -54,34 +41,13 @@ REQUEST_MESSAGE: Final = 512
 REQUEST_CAPABILITIES: Final = 520
 
 
-class Copter(ABC):
-    """One autopilot from switching on; see `Autopilot`."""
-
-    firmware: ClassVar[FirmwareProfile]
+class Copter(ReportingCopter):
+    """One copter from switching on."""
 
     def __init__(self, body: Body, controller: AltitudeController, *, system: int) -> None:
-        self.dialect = self.firmware.dialect
-        self.system, self.component = system, COMPONENT
-        self.uid = _SIMULATED | system
-        self.refuses_arming = False
-        self.ignores_parameters = False
-        self.took_off = False
-        self.estimate_after_s = ESTIMATE_AFTER_S
-        self.armed = False
-        self.mode = self.firmware.modes[0]
-        self.parameters = Parameters(self.firmware.parameters)
-        self.controller = controller
-        self._body = body
-        self._codec = self.dialect.codec(system=system, component=COMPONENT)
-        self._ticks = 0
+        super().__init__(body, controller, system=system)
         self._armed_s = 0.0
         self._heartbeat_s: float | None = None
-        self._is_breached = False
-        self._breaches = 0
-        self._listing: int | None = None
-        self._texts = 0
-        self._timetable = Timetable.from_periods(self.firmware.periods_s)
-        self._out: list[OutgoingMessage] = []
         self.tune()
 
     # ------------------------------------------------------------ differences between autopilots
@@ -102,7 +68,7 @@ class Copter(ABC):
     def follow(self, target: SetPoint, type_mask: int) -> None:
         """Process a position target, whose altitude is above the ground, with its POSITION_TARGET_TYPEMASK."""
 
-    def follow_stream(self) -> None:  # noqa: B027  not every autopilot has such a mode
+    def follow_stream(self) -> None:
         """Fly by streamed set points, in a mode of behaviour FOLLOW."""
 
     @abstractmethod
@@ -125,19 +91,7 @@ class Copter(ABC):
         """Return why a commanded mode is not entered; None if it is."""
         return None
 
-    def prearm_failure(self) -> str | None:
-        """Return why its arming checks do not pass, as reported regularly; None if they pass."""
-        return self.firmware.no_estimate if self.refuses_arming or not self._has_estimate else None
-
-    @property
-    def _has_estimate(self) -> bool:
-        return self.boot_s >= self.estimate_after_s
-
     # ------------------------------------------------------------ time
-
-    @property
-    def boot_s(self) -> float:
-        return self._ticks * TICK_S
 
     def receive(self, data: bytes) -> None:
         for message in self._codec.parse(data):
@@ -145,19 +99,14 @@ class Copter(ABC):
             if handler is not None and getattr(message, "target_system", 0) in (0, self.system):
                 handler(self, message)
 
-    def tick(self) -> list[OutgoingMessage]:
-        self._ticks += 1
+    def advance(self) -> None:
         was_landing = self.controller.phase is Phase.LANDING
         self.controller.tick()
         if was_landing and not self.controller.flies:
-            self._disarm()
+            self.kill()
         self._watch_idling()
         self._watch_link()
         self._watch_fence()
-        self._report()
-        self._report_readiness()
-        out, self._out = self._out, []
-        return out
 
     def restore_persistent(self, before: Self) -> None:
         """Copy the parameters and the hardware id after a reboot."""
@@ -195,13 +144,15 @@ class Copter(ABC):
         self.enter(self.find_mode(self.firmware.automatic))
 
     def kill(self) -> None:
-        self._disarm()
+        self.armed = False
+        self.controller.stop()
 
     def fly_home(self) -> None:
         self.enter(self.find_mode(self.firmware.home))
 
-    def held(self, parameter: str) -> float:
-        return self.parameters[parameter]
+    def mode_numbered(self, custom: int) -> FlightMode | None:
+        """Return the mode with this number in HEARTBEAT."""
+        return next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
 
     def find_mode(self, name: str) -> FlightMode:
         return next(mode for mode in self.firmware.modes if mode.name == name)
@@ -223,14 +174,10 @@ class Copter(ABC):
             return reason
         return None if self.mode.may_arm else self.firmware.not_armable
 
-    def _disarm(self) -> None:
-        self.armed = False
-        self.controller.stop()
-
     def _watch_idling(self) -> None:
         limit_s = self.idle_limit_s()
         if self.armed and not self.controller.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
-            self._disarm()
+            self.kill()
 
     def _watch_link(self) -> None:
         """React to a lost ground station, if there has been one."""
@@ -243,14 +190,17 @@ class Copter(ABC):
 
     def _watch_fence(self) -> None:
         limit_m, reaction = self.fence()
-        is_outside = reaction is not Reaction.NONE and self.controller.flies and self._body.altitude_m > limit_m
-        was_outside, self._is_breached = self._is_breached, is_outside
+        is_outside = reaction is not Reaction.NONE and self.controller.flies and self.body.altitude_m > limit_m
+        was_outside, self.is_breached = self.is_breached, is_outside
         if is_outside and not was_outside:
-            self._breaches += 1
+            self.breaches += 1
             self.send("FENCE_STATUS")
             self.react(reaction, self.firmware.fence_breached)
 
-    def _report_readiness(self) -> None:
+    def report(self, due: list[str]) -> None:
+        for kind in due:
+            if self._can_send(kind):
+                self.send(kind)
         if not self.armed and self._ticks % _REPORT_TICKS == 0:
             self.report_checks()
 
@@ -269,60 +219,18 @@ class Copter(ABC):
 
     # ------------------------------------------------------------ sending
 
-    def send_text(self, text: str) -> None:
-        """Send a critical STATUSTEXT; a long text is sent in several chunks with one number."""
-        self._texts = self._texts % _LAST_TEXT + 1 if len(text) > _TEXT_LENGTH else self._texts
-        for chunk, start in enumerate(range(0, len(text), _TEXT_LENGTH)):
-            number = self._texts if len(text) > _TEXT_LENGTH else 0
-            part = text[start : start + _TEXT_LENGTH]
-            self._out.append(
-                OutgoingMessage("STATUSTEXT", {"severity": 2, "text": part, "id": number, "chunk_seq": chunk})
-            )
-
     def send(self, kind: str) -> None:
         """Send one of the reports now."""
-        self._out.append(OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(self._snapshot())))
-
-    def _report(self) -> None:
-        if self._listing is not None and self._ticks % _LIST_EVERY_TICKS == 0:
-            self._send_parameter(self._listing)
-            self._listing = self._listing + 1 if self._listing + 1 < len(self.parameters) else None
-        due = [kind for kind in self._timetable.due(self._ticks) if self._can_send(kind)]
-        if due:
-            now = self._snapshot()
-            self._out += [OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(now)) for kind in due]
+        self._send(kind, REPORTS[kind](self))
 
     def _can_send(self, kind: str) -> bool:
         if kind in _ESTIMATED:
-            return self._has_estimate
+            return self.has_estimate
         return kind not in _CONTROLLED or self.controller.flies
 
-    def _snapshot(self) -> copter_telemetry.Snapshot:
-        body, firmware = self._body, self.firmware
-        return copter_telemetry.Snapshot(
-            boot_s=self.boot_s,
-            north_m=body.north_m,
-            north_m_s=body.north_m_s,
-            local_m=body.altitude_m + firmware.ground_m,
-            altitude_m=body.altitude_m,
-            climb_rate_m_s=body.climb_rate_m_s,
-            thrust=body.thrust,
-            battery_v=body.battery_v,
-            armed=self.armed,
-            autopilot=firmware.autopilot,
-            base_mode=self.mode.base_mode,
-            custom_mode=self.mode.custom_mode,
-            status=_ACTIVE if self.controller.flies else _STANDBY,
-            landed_state=_LANDED_STATES[self.controller.phase],
-            version=firmware.version,
-            uid=self.uid,
-            breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
-            breaches=self._breaches,
-            ready=self.prearm_failure() is None,
-            controller=self.controller,
-        )
-
-    def _send_parameter(self, place: int) -> None:
+    def send_parameter(self, place: int) -> None:
+        if place >= len(self.parameters):
+            return
         parameter, value = self.parameters.at(place)
         fields: dict[str, FieldValue] = {
             "param_id": parameter.name,
@@ -331,28 +239,17 @@ class Copter(ABC):
             "param_count": len(self.parameters),
             "param_index": place,
         }
-        self._out.append(OutgoingMessage("PARAM_VALUE", fields))
+        self._send("PARAM_VALUE", fields)
 
     def _acknowledge(self, message: Message, command: int, result: int) -> None:
-        sender = {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
-        fields = {"command": command, "result": result, "progress": 0, "result_param2": 0, **sender}
-        self._out.append(OutgoingMessage("COMMAND_ACK", fields))
+        done = {"command": command, "result": result, "progress": 0, "result_param2": 0}
+        self._send("COMMAND_ACK", {**done, **sender(message)})
 
     # ------------------------------------------------------------ receiving
 
     def _on_heartbeat(self, message: Message) -> None:
         if number(message, "type") == _GROUND_STATION and self.counts_heartbeat(message):
             self._heartbeat_s = self.boot_s
-
-    def _on_param_list(self, _message: Message) -> None:
-        self._listing = 0
-
-    def _on_param_read(self, message: Message) -> None:
-        """Send a parameter; a request for an unknown one has no reply."""
-        index = int(number(message, "param_index"))
-        place = self.parameters.place(text(message, "param_id")) if index < 0 else index
-        if place is not None and place < len(self.parameters):
-            self._send_parameter(place)
 
     def _on_param_set(self, message: Message) -> None:
         """Set a parameter without a range check; reply with the value then held."""
@@ -366,12 +263,12 @@ class Copter(ABC):
         if fits and value is not None:
             self.parameters[parameter.name] = value
             self.tune()
-        self._send_parameter(place)
+        self.send_parameter(place)
 
     def _on_set_mode(self, message: Message) -> None:
         """Set the mode by the older message, which has no reply."""
         custom = int(number(message, "custom_mode"))
-        mode = next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
+        mode = self.mode_numbered(custom)
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
             self._enter_if_allowed(mode)
 
@@ -384,7 +281,7 @@ class Copter(ABC):
         """Set the rate of all telemetry by the older message."""
         rate_hz = number(message, "req_message_rate") if number(message, "start_stop") else 0.0
         for kind in self.firmware.streams:
-            self._timetable.set(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
+            self.report_every(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
 
     def _on_command(self, message: Message) -> None:
         command = int(number(message, "command"))
@@ -399,7 +296,7 @@ class Copter(ABC):
         if not (self.controller.is_landed or force):
             self.send_text(self.firmware.not_landed)
             return self.firmware.refused
-        self._disarm()
+        self.kill()
         return ACCEPTED
 
     def _handle_mode(self, message: Message) -> int:
@@ -416,9 +313,6 @@ class Copter(ABC):
         self.enter(mode)
         return ACCEPTED
 
-    def _handle_take_off(self, message: Message) -> int:
-        return self.take_off(number(message, "param7"))
-
     def _handle_land(self, _message: Message) -> int:
         self.enter(self.find_mode(self.firmware.land))
         return ACCEPTED
@@ -430,7 +324,7 @@ class Copter(ABC):
             return FAILED
         interval_us = number(message, "param2")
         default_s = self.firmware.periods_s.get(kind, 0.0)
-        self._timetable.set(kind, default_s if interval_us == 0.0 else interval_us / 1e6)
+        self.report_every(kind, default_s if interval_us == 0.0 else interval_us / 1e6)
         return ACCEPTED
 
     def _handle_request(self, message: Message) -> int:
@@ -442,8 +336,8 @@ class Copter(ABC):
 
     def _requested(self, message: Message) -> str | None:
         """Return the message that a command is about, or None if this autopilot lacks it."""
-        kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
-        return None if kind in self.firmware.lacks else kind
+        kind = self.dialect.name_of(_whole(number(message, "param1")))
+        return kind if kind in REPORTS and kind not in self.firmware.lacks else None
 
     def _handle_checks(self, _message: Message) -> int:
         if self.armed:
@@ -461,13 +355,6 @@ def _whole(value: float) -> int:
     return int(value) if abs(value) < 1e9 else -1
 
 
-_LANDED_STATES: Final = {
-    Phase.IDLE: copter_telemetry.ON_GROUND,
-    Phase.CLIMBING: copter_telemetry.TAKING_OFF,
-    Phase.HOLDING: copter_telemetry.IN_AIR,
-    Phase.LANDING: copter_telemetry.LANDING,
-}
-
 _REPORTS: Final = {GET_HOME: "HOME_POSITION", REQUEST_CAPABILITIES: "AUTOPILOT_VERSION"}
 
 _HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
@@ -483,7 +370,7 @@ _HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
 
 _COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
     LAND: Copter._handle_land,
-    TAKE_OFF: Copter._handle_take_off,
+    TAKE_OFF: lambda copter, message: copter.take_off(number(message, "param7")),
     SET_MODE: Copter._handle_mode,
     ARM_DISARM: Copter._handle_arm,
     RUN_PREARM_CHECKS: Copter._handle_checks,

@@ -34,11 +34,13 @@ def real(name: str, default: float) -> Parameter:
 
 
 class Parameters:
-    """Parameter values by name and by place."""
+    """Parameter values by name, the first of that name, and by place."""
 
-    def __init__(self, known: Sequence[Parameter]) -> None:
+    def __init__(self, known: Sequence[Parameter], *, longest_name: int = 16) -> None:
+        """Parameters with longer names are only found by their place."""
         self._known = tuple(known)
-        self._places = {parameter.name: place for place, parameter in enumerate(known)}
+        places = reversed([(each.name, place) for place, each in enumerate(known)])
+        self._places = {name: place for name, place in places if len(name) <= longest_name}
         self._values = [parameter.default for parameter in known]
 
     def __len__(self) -> int:

@@ -206,7 +206,7 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
             return _ended("Lost", row)
         case TrialState.CAPTURED:
             reason = reason_of(row)
-            doubt = f"; the measurement is doubtful: {reason}" if reason else ""
+            doubt = f"; the measurement is doubtful: {reason.removesuffix('.')}" if reason else ""
             return f"Landed and recorded{_glitches(row)}{doubt}. Review the flight."
         case _:
             return ""

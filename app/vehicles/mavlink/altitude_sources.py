@@ -35,20 +35,16 @@ class AltitudeSource(Protocol):
     @property
     def name(self) -> str:
         """Description for the operator: what it is and where it is received."""
-        ...
 
     @property
     def trouble(self) -> str:
         """Reason why no samples arrive, if known; otherwise empty."""
-        ...
 
     def on_message(self, received: Received) -> None:
         """Process a message of the vehicle's own link; a source with its own link ignores it."""
-        ...
 
     def take(self) -> Sequence[SourceSample]:
         """Return the samples since the last call, oldest first."""
-        ...
 
     def close(self) -> None: ...
 

@@ -165,7 +165,7 @@ class VehicleConnection(ObservedVehicle):
     def _check(self, watched_s: float) -> tuple[GroundObservation, tuple[CheckItem, ...]]:
         radio, options = self._radio, self._options
         self._identify()
-        if not preparation.reports_armed(radio) and not self._quarantine.is_active:
+        if not radio.reports_armed and not self._quarantine.is_active:
             self._request_telemetry()
             preparation.make_armable(radio)
         watched = self._observe_standing(watched_s)

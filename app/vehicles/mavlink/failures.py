@@ -1,15 +1,14 @@
-"""Failures of a trial: reaction and outcome of each; and the limits of a trial. Their conditions are described in
+"""Failures of a trial: reaction and outcome of each. Their conditions are described in
 docs/real-flight.md.
 
 The table is ordered by severity: of several failures the first one counts.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
-from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.flight_end import Failure, StopRequest
 
 __all__ = ["Failure"]
@@ -95,70 +94,6 @@ NOT_DESCENDING_AFTER_S: Final = 5.0
 """Time after the command to land after which a vehicle that does not descend is reported."""
 DESCENDING_M_S: Final = -0.2
 """A vehicle that descends faster than this is landing."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """Limits of a trial.
-
-    `set_point_m` is on the vehicle's own datum, like altitudes; `ceiling_m` is above the ground under the vehicle.
-    Modes are named as in `Heartbeat`: `flying_modes` and `landing_modes` are empty if any mode is allowed, the vehicle
-    enters `hovering_modes` after the climb, in all modes except the `automatic_modes` a pilot flies, and `mode_names`
-    are for display.
-    Heartbeats are sent every `heartbeat_s`. `blocks` are the names of the flight plan's blocks by number;
-    `arming_blocks`, `flying_blocks` and `landing_blocks` are those that the vehicle may be in, empty if it has none;
-    it enters `landed_blocks` once it has landed by its own judgement.
-    """
-
-    set_point_m: float
-    heartbeat_s: float
-    min_battery_v: float
-    silent_s: float = 1.0
-    stuck_s: float = 0.25
-    lost_s: float = 0.5
-    slow_s: float = 3.0
-    late_s: float = 1.5
-    ceiling_m: float = ALTITUDE_LIMIT_M
-    radius_m: float = 5.0
-    climb_rate_m_s: float = 4.0
-    impact_m_s: float = 2.0
-    crossing_m: float = 0.3
-    crossings: int = 4
-    flying_modes: frozenset[str] = frozenset()
-    hovering_modes: frozenset[str] = frozenset()
-    landing_modes: frozenset[str] = frozenset()
-    automatic_modes: frozenset[str] = frozenset()
-    mode_names: Mapping[str, str] = field(default_factory=dict)
-    blocks: Mapping[int, str] = field(default_factory=dict)
-    arming_blocks: frozenset[str] = frozenset()
-    flying_blocks: frozenset[str] = frozenset()
-    landing_blocks: frozenset[str] = frozenset()
-    landed_blocks: frozenset[str] = frozenset()
-
-    @property
-    def confirmation_s(self) -> float:
-        """Minimum time between two heartbeats that confirm each other."""
-        return CONFIRMATION_PERIODS * self.heartbeat_s
-
-    def is_manual(self, mode: str) -> bool:
-        """Whether a pilot flies the vehicle in this mode. A mode that is not known is a pilot's."""
-        return bool(mode and self.automatic_modes) and mode not in self.automatic_modes
-
-    def named(self, mode: str) -> str:
-        """Return the display name of a mode."""
-        return self.mode_names.get(mode, mode)
-
-    def stretched(self, factor: float) -> "Limits":
-        """Return the limits with all timeouts for packets multiplied by this factor."""
-        return replace(
-            self,
-            heartbeat_s=self.heartbeat_s * factor,
-            silent_s=self.silent_s * factor,
-            stuck_s=self.stuck_s * factor,
-            lost_s=self.lost_s * factor,
-            slow_s=self.slow_s * factor,
-            late_s=self.late_s * factor,
-        )
 
 
 def land_every_s(elapsed_s: float, land_again_s: float) -> float:

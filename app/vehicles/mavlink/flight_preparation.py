@@ -5,14 +5,14 @@ import numpy as np
 from app.autopilots.commands import Setting
 from app.vehicles.base import CheckItem, FlightOptions
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import parameters, preflight, preparation
+from app.vehicles.mavlink import parameters, preflight
+from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference
-from app.vehicles.mavlink.ground_observation import Ground
-from app.vehicles.mavlink.opening import limits_of
+from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.parameters import GainStore
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.set_point_schedule import with_hold
-from app.vehicles.mavlink.trial_state import Plan
 
 
 def flies_steps(order: FlightOptions) -> bool:
@@ -23,8 +23,8 @@ def flies_steps(order: FlightOptions) -> bool:
 def prepare_set_points(radio: AutopilotLink, release: int) -> dict[str, float]:
     """Request the telemetry that a flight with several set points needs, and return the parameters of its loop, which
     the replica would otherwise replace by defaults; `release` is the place of the vehicle's gains among the sets."""
-    preparation.prepare_set_points(radio)
     profile = radio.profile
+    set_up(radio, tuple(each.step(radio.target) for each in profile.set_point_telemetry))
     if not profile.loop_parameters:
         return {}
     return parameters.read_loop(radio, profile.loop_parameters[release], profile.may_lack)
@@ -59,22 +59,22 @@ def compile_reference(order: FlightOptions, radio: AutopilotLink) -> None:
         reference(order.set_points, np.zeros(1))
 
 
-def plan_of(order: FlightOptions, ground: Ground, radio: AutopilotLink, options: Options, gains: GainStore) -> Plan:
+def plan_of(
+    order: FlightOptions, ground: GroundObservation, radio: AutopilotLink, options: Options, gains: GainStore
+) -> Plan:
     """Return the plan of a flight from there, with the set points of the order."""
-    profile, holds = radio.profile, flies_steps(order) and radio.profile.holds_first
+    holds = flies_steps(order) and radio.profile.holds_first
     plan = Plan(
+        autopilot=radio.profile,
         safe_gains=gains.safe_settings,
         trial_gains=gains.staged_settings,
+        blocks={number: name for name, number in radio.target.blocks.items()},
         ground_m=0.0,
-        climbs_from_ground=profile.climbs_from_ground,
-        lift_off_s=profile.lift_off_s,
-        land_again_s=profile.land_again_s,
-        stop_settings=profile.stop_settings,
-        mode_parameter=profile.mode_parameter,
-        limits=limits_of(options, radio),
-        record_s=order.record_s,
+        set_point_m=radio.target.altitude_m,
         set_points=with_hold(order.set_points) if holds else order.set_points,
-        holds_first=holds,
-        following_modes=profile.following_modes if holds else frozenset(),
+        record_s=order.record_s,
+        min_battery_v=float(options["min_battery_v"]),
+        radius_m=float(options["radius_m"]),
+        timeout_factor=radio.timeout_factor,
     )
     return plan.on_ground_at(ground.altitude_m)

@@ -21,17 +21,9 @@ _IRREGULAR: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
-    """Position of the standing vehicle on its own datum, and its altitudes from a second source, on the source's."""
-
-    altitude_m: float
-    last: Position
-    secondary_m: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class GroundObservation:
-    """Messages of a vehicle on the ground within `seconds`."""
+    """Messages of a vehicle on the ground within `seconds`; `secondary_m` are its altitudes from a second source, on
+    that one's datum."""
 
     positions: tuple[Position, ...]
     seconds: float
@@ -46,10 +38,9 @@ class GroundObservation:
         return replace(self, positions=positions)
 
     @property
-    def ground(self) -> Ground:
-        """Position of the ground. Raises ValueError without a position."""
-        altitude_m = statistics.median(position.altitude_m for position in self.positions)
-        return Ground(altitude_m, self._last, self.secondary_m)
+    def altitude_m(self) -> float:
+        """Altitude of the ground on the vehicle's own datum. Raises ValueError without a position."""
+        return statistics.median(position.altitude_m for position in self.positions)
 
     @property
     def moved_m(self) -> float:
@@ -65,10 +56,10 @@ class GroundObservation:
     @property
     def is_at_reference(self) -> bool:
         """Whether its altitude is that of the ground reference."""
-        return bool(self.positions) and abs(self.ground.altitude_m) <= STANDS_WITHIN_M
+        return bool(self.positions) and abs(self.altitude_m) <= STANDS_WITHIN_M
 
     @property
-    def _last(self) -> Position:
+    def last(self) -> Position:
         """Position with the latest time that continues another one: a single one by another clock is ignored, and so
         are copies that arrive late."""
         latest_first = sorted(self.positions, key=lambda position: position.time_boot_s, reverse=True)

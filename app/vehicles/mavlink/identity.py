@@ -3,6 +3,8 @@
 from dataclasses import replace
 from typing import Final
 
+from app.autopilots import commands
+from app.autopilots.autopilot import AutopilotError
 from app.autopilots.measurements import Heartbeat, Version
 from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import Identity, VehicleError
@@ -79,9 +81,10 @@ class VehicleIdentity:
         s."""
         radio = self._radio
         radio.receive_pending()
-        request, is_needed = radio.profile.version_request(radio.target), bool(self.missing_uid)
-        if request is not None and (is_needed or not (radio.seen.version or radio.seen.uid)):
+        is_needed = bool(self.missing_uid)
+        if radio.profile.reports_version and (is_needed or not (radio.seen.version or radio.seen.uid)):
             attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS
+            request = commands.request_version(radio.target)
             radio.request(request, lambda reply: isinstance(reply, Version), attempts=attempts)
 
     def await_vehicle(self, address: str) -> None:
@@ -132,8 +135,8 @@ class VehicleIdentity:
         the plan's problem, or an empty string."""
         radio, problem = self._radio, ""
         try:
-            radio.target = replace(radio.target, blocks=radio.explore())
-        except VehicleError as error:
+            radio.target = replace(radio.target, blocks=radio.profile.explore(radio.request, radio.target))
+        except (AutopilotError, VehicleError) as error:
             problem = str(error)
         radio.send(*radio.profile.conclude(radio.target))
         self.request()

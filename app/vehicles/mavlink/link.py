@@ -32,11 +32,10 @@ from app.autopilots.dialects import (
 from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
+from app.vehicles.mavlink.link_health import LinkHealth, LossCounter
 from app.vehicles.mavlink.other_peers import GONE_AFTER_S, OtherPeers
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
-
-__all__ = ["Link", "LinkError", "LinkHealth", "LossCounter", "Received"]
 
 HEARTBEAT_EVERY_S: Final = 1.0
 UNATTENDED_AFTER_S: Final = 3.0
@@ -46,8 +45,6 @@ MAX_QUEUED_MESSAGES: Final = 20_000
 """Maximum number of messages that wait for `receive`; beyond it the oldest are dropped, and counted."""
 STEP_S: Final = 1.0 / 256.0
 """Step of the clock between two reads of a transport without a thread."""
-MAX_SEQUENCE_LEAD: Final = 128
-"""A sequence number further ahead than this is an old one, because packets may overtake each other."""
 DUPLICATE_TIMEOUT_S: Final = 3.0
 """Time for which messages of another peer with the vehicle's ids count."""
 
@@ -66,46 +63,6 @@ class Received:
 
     message: Message
     received_s: float
-
-
-@dataclass(slots=True)
-class LinkHealth:
-    """Statistics of a link; times in seconds of the link's clock."""
-
-    received: int = 0
-    """Messages of the vehicle that the dialect knows."""
-    lost: int = 0
-    """Messages missing by the vehicle's sequence numbers."""
-    bad: int = 0
-    """Sections of bad data: wrong checksums, wrong signatures."""
-    foreign: int = 0
-    """Datagrams of other senders and messages of other systems, all dropped."""
-    overrun: int = 0
-    """Messages dropped because `receive` was not called."""
-    sent: int = 0
-    unsent: int = 0
-    """Messages that could not be sent: no peer yet, no connection, full buffer."""
-    last_packet_s: float | None = None
-    last_heartbeat_s: float | None = None
-
-
-class LossCounter:
-    """Counts missing messages by the sequence numbers of each component."""
-
-    def __init__(self, uncounted: tuple[str, ...]) -> None:
-        """`uncounted` are the prefixes of the names of messages with a separate sequence counter."""
-        self._uncounted = uncounted
-        self._latest: dict[int, int] = {}
-        self.lost = 0
-
-    def count(self, kind: str, component: int, number: int) -> None:
-        """Count a message by its sequence number, 0 to 255; late and repeated messages are ignored."""
-        if kind.startswith(self._uncounted):
-            return
-        ahead = (number - self._latest.get(component, number - 1)) % 256
-        if 0 < ahead < MAX_SEQUENCE_LEAD:
-            self.lost += ahead - 1
-            self._latest[component] = number
 
 
 class Link:

@@ -21,7 +21,7 @@ from app.autopilots.measurements import (
 )
 from app.vehicles.mavlink.boot_clock import unwrapped
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
-from app.vehicles.mavlink.failures import GROUND_M, Finding, Limits
+from app.vehicles.mavlink.failures import GROUND_M, Finding
 from app.vehicles.mavlink.monitors.battery import BatteryMonitor
 from app.vehicles.mavlink.monitors.climb import ClimbMonitor
 from app.vehicles.mavlink.monitors.clock import ATTENDED_S, ClockMonitor
@@ -32,6 +32,7 @@ from app.vehicles.mavlink.monitors.link import LinkMonitor
 from app.vehicles.mavlink.monitors.modes import ModeMonitor
 from app.vehicles.mavlink.monitors.positions import DRIFT_M, PositionMonitor
 from app.vehicles.mavlink.monitors.second_source import SecondSourceMonitor
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 _DRIFT_M_S: Final = 0.5
@@ -111,28 +112,28 @@ def change_set_point(watch: TrialObservation, set_point_m: float) -> TrialObserv
 
 
 def update(
-    watch: TrialObservation, measurement: Measurement | None, now_s: float, limits: Limits
+    watch: TrialObservation, measurement: Measurement | None, now_s: float, plan: Plan
 ) -> tuple[TrialObservation, tuple[Position, ...]]:
     """Return the observation after one packet (None: one without a measurement), and the positions that it confirms."""
     stuck_s = watch.clock.stuck_s + min(now_s - watch.link.received_s, ATTENDED_S)
     watch = replace(watch, link=replace(watch.link, received_s=now_s), clock=replace(watch.clock, stuck_s=stuck_s))
     match measurement:
         case Position():
-            return _add_position(watch, measurement, now_s, limits)
+            return _add_position(watch, measurement, now_s, plan)
         case InvalidPosition(time_boot_s=time_boot_s) if watch.last is None or time_boot_s > watch.last.time_boot_s:
             watch = replace(watch, clock=replace(watch.clock, advanced_s=now_s, stuck_s=0.0))
         case Attitude(lean_rad=lean_rad):
             watch = replace(watch, envelope=watch.envelope.add_attitude(lean_rad, now_s))
         case Heartbeat():
-            watch = replace(watch, modes=watch.modes.update(measurement, now_s, limits))
+            watch = replace(watch, modes=watch.modes.update(measurement, now_s, plan))
         case Battery(voltage_v=float(volts)):
-            watch = replace(watch, battery=watch.battery.update(volts, now_s, limits))
+            watch = replace(watch, battery=watch.battery.update(volts, now_s, plan))
         case FenceBreach(limit=limit):
             watch = replace(watch, envelope=replace(watch.envelope, breached=limit or "some limit"))
         case LandedState(on_ground=landed):
             watch = replace(watch, ground=watch.ground.update(landed, now_s))
         case BlockEntered(number=number):
-            block = limits.blocks.get(number, str(number))
+            block = plan.blocks.get(number, str(number))
             watch = replace(watch, modes=replace(watch.modes, block=block, block_s=now_s))
         case _:
             pass
@@ -140,7 +141,7 @@ def update(
 
 
 def _add_position(
-    watch: TrialObservation, position: Position, now_s: float, limits: Limits
+    watch: TrialObservation, position: Position, now_s: float, plan: Plan
 ) -> tuple[TrialObservation, tuple[Position, ...]]:
     newest, last = watch.positions.doubted or watch.last, watch.last
     position = unwrapped(position, newest)
@@ -161,7 +162,7 @@ def _add_position(
         clock=clock if clock.other is None else replace(clock, other=None),
         positions=positions,
         climb=watch.climb.update(last, position),
-        envelope=watch.envelope.add_position(position, limits),
+        envelope=watch.envelope.add_position(position, plan),
     )
     return watch, confirmed
 
@@ -177,16 +178,14 @@ def update_secondary(watch: TrialObservation, sample: SecondaryAltitudeReceived)
     return replace(watch, second=watch.second.update(sample, vehicle_m))
 
 
-def settle(
-    watch: TrialObservation, now_s: float, ground_m: float, limits: Limits, *, commanded: bool
-) -> TrialObservation:
+def settle(watch: TrialObservation, now_s: float, plan: Plan, *, commanded: bool) -> TrialObservation:
     """Note since when every source shows it on the ground: its position by height and speed, the landed state that it
     reports, and the second source of altitude. A single sample that jumps is ignored. Before it is `commanded` to take
     off, its landed state or its block is believed rather than an altitude that drifts."""
-    positions = watch.positions
+    positions, ground_m = watch.positions, plan.ground_m
     if positions.is_in_doubt(now_s):
         return watch
-    stands = not commanded and stands_by_own_account(watch, now_s, ground_m, limits)
+    stands = not commanded and stands_by_own_account(watch, now_s, plan)
     airborne = positions.is_airborne(now_s, ground_m) and not stands
     grounded, said_to_fly = stands or positions.is_grounded(now_s, ground_m), is_said_to_fly(watch, now_s, ground_m)
     climb = watch.climb.settle(ground_m, airborne=airborne)
@@ -203,19 +202,20 @@ def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bo
     return watch.ground.reports_flight(now_s) or (second_m is not None and second_m - ground_m > GROUND_M)
 
 
-def has_reported_landing(watch: TrialObservation, now_s: float, limits: Limits) -> bool:
+def has_reported_landing(watch: TrialObservation, now_s: float, plan: Plan) -> bool:
     """Whether it has reported for a second that it is on the ground, by its landed state or the block of its plan."""
-    if watch.modes.block in limits.landed_blocks:
+    if watch.modes.block in plan.autopilot.landed_blocks:
         return now_s - watch.modes.block_s >= AGREED_S
     return watch.ground.has_reported_landing(now_s)
 
 
-def stands_by_own_account(watch: TrialObservation, now_s: float, ground_m: float, limits: Limits) -> bool:
+def stands_by_own_account(watch: TrialObservation, now_s: float, plan: Plan) -> bool:
     """Whether it reports that it is on the ground, or in a block of its plan that has no thrust, and its altitude has
     not drifted further than one may, nor faster. To be called for a vehicle that was not commanded to take off."""
     last = watch.last
-    drifts = last is None or (abs(last.altitude_m - ground_m) <= DRIFT_M and abs(last.climb_rate_m_s) <= _DRIFT_M_S)
-    return drifts and (watch.ground.reported_standing(now_s) or watch.modes.block in limits.arming_blocks)
+    stays = last is None or abs(last.altitude_m - plan.ground_m) <= DRIFT_M
+    stays = stays and (last is None or abs(last.climb_rate_m_s) <= _DRIFT_M_S)
+    return stays and (watch.ground.reported_standing(now_s) or watch.modes.block in plan.autopilot.arming_blocks)
 
 
 def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
@@ -235,31 +235,31 @@ def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
     return ""
 
 
-def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
+def find_on_ground(watch: TrialObservation, plan: Plan, now_s: float) -> Finding | None:
     """Return the most severe failure of a vehicle before the takeoff command, if any."""
     return (
         watch.identity.find_reboot()
         or watch.envelope.find_oscillation()
         or watch.identity.find_duplicate()
-        or watch.link.find(limits, watch.modes.heartbeat_s, now_s)
-        or find_frozen(watch, limits, now_s)
-        or find_lost_position(watch, limits, now_s)
+        or watch.link.find(plan, watch.modes.heartbeat_s, now_s)
+        or find_frozen(watch, plan, now_s)
+        or find_lost_position(watch, plan, now_s)
         or watch.battery.find(now_s)
     )
 
 
-def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
+def find_frozen(watch: TrialObservation, plan: Plan, now_s: float) -> Finding | None:
     return (
-        watch.clock.find_frozen(limits, watch.last, watch.positions.accepted_s)
+        watch.clock.find_frozen(plan, watch.last, watch.positions.accepted_s)
         or watch.positions.find_frozen()
-        or watch.second.find_blind(limits, now_s)
+        or watch.second.find_blind(plan, now_s)
     )
 
 
-def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
+def find_lost_position(watch: TrialObservation, plan: Plan, now_s: float) -> Finding | None:
     """Find a lost position; to be called after a lost link was looked for, because silence is one."""
     return (
-        watch.positions.find_implausible(limits, watch.link.received_s, now_s)
-        or watch.clock.find_late(limits)
+        watch.positions.find_implausible(plan, watch.link.received_s, now_s)
+        or watch.clock.find_late(plan)
         or watch.positions.find_unreliable()
     )

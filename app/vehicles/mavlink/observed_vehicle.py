@@ -15,13 +15,14 @@ from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preparation
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
+from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
 from app.vehicles.mavlink.opening import open_radio
 from app.vehicles.mavlink.parameters import GainStore
 from app.vehicles.mavlink.quarantine import Quarantine
-from app.vehicles.mavlink.radio import StatusReader
 from app.vehicles.mavlink.repeated_command import STOPPING_S, RepeatedCommand
+from app.vehicles.mavlink.status_reader import StatusReader
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial_state import State
 
@@ -179,7 +180,8 @@ class ObservedVehicle(ABC):
             self._identity.pinned = self._identity.pinned.completed_by(self.identity)
 
     def _request_telemetry(self) -> None:
-        preparation.prepare(self._radio, float(self._options["telemetry_hz"]))
+        radio = self._radio
+        set_up(radio, radio.profile.prepare(radio.target, float(self._options["telemetry_hz"])))
 
     def _renew_telemetry(self) -> None:
         """Request telemetry again from a vehicle on the ground of which only heartbeats have arrived for 2 s, and

@@ -1,4 +1,4 @@
-"""Opening of a vehicle's link by its options, and the limits of its trials."""
+"""Opening of a vehicle's link by its options."""
 
 import datetime as dt
 from collections.abc import Callable
@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Final
 
 from app.autopilots import signing
-from app.autopilots.autopilot import Autopilot
 from app.autopilots.commands import Target
 from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.events import PacketReceived
-from app.vehicles.mavlink.failures import HELP, Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.radio import REPLY_TIMEOUT_S, AutopilotLink
 from app.vehicles.mavlink.transports import Transport
@@ -22,11 +20,6 @@ TAKEOFF_ALTITUDE_M: Final = 3.0
 MAX_UNSCALED_SPEED: Final = 4.0
 """Up to this clock speed the timeouts of a simulated vehicle are those of a real one. Beyond, they are longer by its
 clock, because the pauses of a busy computer are in wall time."""
-
-
-def timeout_factor_of(options: Options) -> float:
-    """Return the factor on the timeouts of a real vehicle."""
-    return max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED)
 
 
 def open_radio(
@@ -70,36 +63,10 @@ def open_radio(
         profile,
         clock,
         target,
-        reply_timeout_s=REPLY_TIMEOUT_S * timeout_factor_of(options),
+        reply_timeout_s=REPLY_TIMEOUT_S * max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED),
         on_message=on_message,
         on_wait=on_wait,
     )
-
-
-def limits_of(options: Options, radio: AutopilotLink) -> Limits:
-    """Return the limits of a vehicle that stands at its own zero and takes off to the altitude of its target."""
-    profile = radio.profile
-    return Limits(
-        set_point_m=radio.target.altitude_m,
-        heartbeat_s=profile.heartbeat_s,
-        min_battery_v=float(options["min_battery_v"]),
-        radius_m=float(options["radius_m"]),
-        flying_modes=profile.flying_modes,
-        hovering_modes=profile.hovering_modes,
-        landing_modes=profile.landing_modes,
-        automatic_modes=profile.automatic_modes,
-        mode_names={**profile.mode_names, **_described(profile)},
-        blocks={number: name for name, number in radio.target.blocks.items()},
-        arming_blocks=profile.arming_blocks,
-        flying_blocks=profile.flying_blocks,
-        landing_blocks=profile.landing_blocks,
-        landed_blocks=profile.landed_blocks,
-    ).stretched(timeout_factor_of(options))
-
-
-def _described(profile: Autopilot) -> dict[str, str]:
-    """Return the display names of the modes in which it does not execute Land, with what to do in them."""
-    return {mode: f"{profile.mode_names[mode]}: {what}; {HELP}" for mode, what in profile.modes_without_land.items()}
 
 
 def _log_path(folder: str) -> Path | None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from app.autopilots import commands
 from app.autopilots.autopilot import HoverLimits, Requirement
 from app.autopilots.measurements import VehicleEvent
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
@@ -24,7 +25,7 @@ from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.boot_clock import unwrapped
 from app.vehicles.mavlink.ground_observation import STANDS_WITHIN_M, GroundObservation, find_reception
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE, reports_armed
+from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE
 from app.vehicles.mavlink.radio import AutopilotLink
 
 POSITIONS_HZ: Final = 40.0
@@ -102,7 +103,7 @@ def evaluate_items(
     items = [
         _heartbeat(radio),
         _single_vehicle(radio),
-        DISARMED.item(not reports_armed(radio), "armed" if reports_armed(radio) else "disarmed", "disarmed"),
+        DISARMED.item(not radio.reports_armed, "armed" if radio.reports_armed else "disarmed", "disarmed"),
         *_motion(watched, find_reception(radio.seen.positions, radio.clock.now_s())),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
@@ -217,7 +218,7 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
 
 def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
     """Return the item of its arming checks; none if it reports nothing of them, by events neither."""
-    if not radio.seen.may_arm and not reports_armed(radio):
+    if not radio.seen.may_arm and not radio.reports_armed:
         _request_checks(radio)
     ready = radio.seen.may_arm
     if ready is None:
@@ -228,10 +229,9 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
 
 def _request_checks(radio: AutopilotLink) -> None:
     """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
-    checks, request = radio.profile.checks, radio.profile.checks_request(radio.target)
-    if checks is not None and request is not None:
+    if (checks := radio.profile.checks) is not None:
         radio.request(
-            request,
+            commands.command(radio.target, checks.command),
             lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
             attempts=_CHECKS_ATTEMPTS,
         )
@@ -251,7 +251,7 @@ def _checks_hint(radio: AutopilotLink) -> str:
     hints = ["Correct what it reports; after power-on, wait until it has settled."]
     if _mode(radio) not in arming_modes and (others := sorted(profile.flying_modes & arming_modes)):
         hints.append(f"It can be armed in mode {' or '.join(profile.mode_names[mode] for mode in others)}.")
-    if profile.checks_request(radio.target) is not None:
+    if profile.checks is not None:
         hints.append("QGroundControl shows the reasons in full.")
     return " ".join(hints)
 
@@ -295,7 +295,7 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
     """Check that the flight plan was heard to set the ground reference, if it can, and that the vehicle stands by it:
     a takeoff's altitude counts from there, and so does its error."""
     is_set = radio.seen.has_ground_reference or not radio.profile.refer_to_ground(radio.target)
-    found = f"it stands at {watched.ground.altitude_m:.2f} m" if watched.positions else "waiting for a position"
+    found = f"it stands at {watched.altitude_m:.2f} m" if watched.positions else "waiting for a position"
     if not is_set:
         mode = radio.profile.mode_names.get(_mode(radio), _mode(radio))
         found = f"not set by the flight plan (mode {mode}, block {radio.block or 'not reported'})"

@@ -1,4 +1,4 @@
-"""Preparation of a vehicle on the ground: telemetry, a mode in which it arms, its ground reference, a way to stop its
+"""Preparation of a vehicle on the ground: a mode in which it arms, its ground reference, a way to stop its
 motors. What changes it is sent only once it is certainly disarmed.
 """
 
@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Final
 
 from app.autopilots import commands
-from app.autopilots.commands import Step
 from app.autopilots.measurements import DISARMING, CommandReply
-from app.vehicles.base import SafeGainsError, VehicleError
+from app.vehicles.base import SafeGainsError
+from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.radio import AutopilotLink
 
@@ -34,33 +34,18 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
         radio.target = replace(radio.target, stops_by_command=accepted)
 
 
-def reports_armed(radio: AutopilotLink) -> bool:
-    """Whether its last heartbeat reports that it is armed; `radio.is_armed` takes two."""
-    return radio.seen.heartbeat is not None and radio.seen.heartbeat.armed
-
-
 def require_disarmed(radio: AutopilotLink) -> None:
     """Wait until two heartbeats agree that the vehicle is disarmed. Raises SafeGainsError if it is armed, because only
     Land may be sent to it then, or if they do not agree within 5 s or are of two vehicles."""
     until_s = radio.clock.now_s() + _HEARTBEAT_S * radio.timeout_factor
     while not radio.is_disarmed and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
-    if reports_armed(radio):
+    if radio.reports_armed:
         raise SafeGainsError(ARMED, hint=LAND_FIRST)
     if not radio.is_disarmed:
         raise SafeGainsError("Its heartbeats do not confirm that it is disarmed; nothing was written.", hint=LAND_FIRST)
     if why := radio.link.duplicate_reason:
         raise SafeGainsError(f"Two vehicles use its system id, so nothing was written. {why}", hint=ONE_VEHICLE)
-
-
-def prepare(radio: AutopilotLink, telemetry_hz: float) -> None:
-    """Request telemetry. Raises VehicleError if it is refused."""
-    _set_up(radio, radio.profile.prepare(radio.target, telemetry_hz))
-
-
-def prepare_set_points(radio: AutopilotLink) -> None:
-    """Request the further telemetry of a flight with several set points. Raises VehicleError if it is refused."""
-    _set_up(radio, radio.profile.prepare_set_points(radio.target))
 
 
 def make_armable(radio: AutopilotLink) -> bool:
@@ -69,11 +54,11 @@ def make_armable(radio: AutopilotLink) -> bool:
     profile, may_arm = radio.profile, radio.seen.may_arm
     steps = () if heartbeat is None else profile.make_armable(radio.target, heartbeat.mode, may_arm=may_arm)
     until_s = radio.clock.now_s() + _HEARTBEAT_S * radio.timeout_factor
-    while steps and not radio.is_disarmed and not reports_armed(radio) and radio.clock.now_s() < until_s:
+    while steps and not radio.is_disarmed and not radio.reports_armed and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
     if not (steps and radio.is_disarmed):
         return False
-    _set_up(radio, steps)
+    set_up(radio, steps)
     return True
 
 
@@ -91,14 +76,9 @@ def set_ground_reference(radio: AutopilotLink, watched: GroundObservation) -> bo
         if not watched.stands:
             return True
         seen.has_ground_reference = False
-        _set_up(radio, steps)
+        set_up(radio, steps)
     while not radio.is_armed and radio.clock.now_s() < now_s + _REFERENCE_WITHIN_S:
         radio.listen(_LISTEN_S)
         if radio.block == holding and seen.block_s > now_s:
             return True
     return False
-
-
-def _set_up(radio: AutopilotLink, steps: tuple[Step, ...]) -> None:
-    if why := radio.set_up(steps):
-        raise VehicleError(f"The vehicle could not be set up. {why}", hint="Correct what it reports, then try again.")

@@ -4,6 +4,7 @@ is at rest before the first, and when each took effect.
 Times are by the vehicle's clock, which is known from its positions and their latency, up to the least latency itself.
 """
 
+import dataclasses
 import math
 from typing import Final
 
@@ -18,11 +19,14 @@ from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import ActionDone, PerformAction
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.monitors.set_points import SetPointChange
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_state import Plan, Step, Trial
+from app.vehicles.mavlink.trial_state import Step, Trial
 
 HELD_BEFORE_S: Final = 6.0
 """Time before the first step from which a vehicle holds the first set point by position targets."""
+_LATE_S: Final = 1.5
+"""Permitted delay of a set point."""
 _OVERDUE: Final = 1.2
 """Share of the permitted delay after which no confirmation is awaited: a refusal, with its reason, comes before."""
 LEAD_S: Final = 0.02
@@ -87,7 +91,7 @@ def find_unsettled(trial: Trial) -> Finding | None:
 def find_overdue(trial: Trial, now_s: float) -> Finding | None:
     """Find that the next step is not confirmed although it was due long ago."""
     due_s = _time_s(trial, max(len(trial.set_points.changes) + 1, trial.plan.first_step))  # None after the last
-    if due_s is None or _elapsed_s(trial, now_s) <= due_s + _OVERDUE * trial.plan.limits.late_s:
+    if due_s is None or _elapsed_s(trial, now_s) <= due_s + _OVERDUE * _LATE_S * trial.plan.timeout_factor:
         return None
     return Finding(Failure.SET_POINT, f"The set point of {due_s:g} s was not confirmed in time.")
 
@@ -97,7 +101,7 @@ def find_late(trial: Trial) -> Finding | None:
     changes, plan = trial.set_points.changes, trial.plan
     number = len(changes)
     late_s = changes[-1].times_s[-1] - plan.set_points.times_s[number]
-    if number < plan.first_step or late_s <= plan.limits.late_s:
+    if number < plan.first_step or late_s <= _LATE_S * plan.timeout_factor:
         return None
     return Finding(Failure.SET_POINT, f"A set point took effect {late_s:.1f} s late.")
 
@@ -116,7 +120,7 @@ def command_next(trial: Trial) -> Step:
         return replace(trial, set_points=commanded), (PerformAction(Action.HOLD, set_point_m),)
     trial = replace(
         trial,
-        plan=trial.plan.with_set_point(set_point_m),
+        plan=dataclasses.replace(trial.plan, set_point_m=set_point_m),
         watch=watching.change_set_point(trial.watch, set_point_m),
         set_points=commanded,
     )
@@ -139,8 +143,8 @@ def confirm(trial: Trial, done: ActionDone) -> Trial:
 
 def _climbs(trial: Trial) -> bool:
     """Whether the vehicle has not yet entered the mode in which it hovers after the climb, if there is one."""
-    limits = trial.plan.limits
-    return bool(limits.hovering_modes) and trial.watch.modes.agreed not in limits.hovering_modes
+    modes = trial.plan.autopilot.hovering_modes
+    return bool(modes) and trial.watch.modes.agreed not in modes
 
 
 def _first_step_s(trial: Trial) -> float | None:

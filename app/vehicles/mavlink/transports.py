@@ -6,7 +6,7 @@ flight is handled in the same way for all transports.
 
 import contextlib
 import os
-import selectors
+import select
 import socket
 import termios
 import threading
@@ -50,24 +50,19 @@ class Transport(Protocol):
     @property
     def remote(self) -> Peer | None:
         """Peer that `write` sends to; None until it is known (`adopt`)."""
-        ...
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         """Return the data received, each a datagram or a piece of a stream, with its sender: over UDP anybody can send.
         Waits at most `timeout_s` for the first, or until `wake`."""
-        ...
 
     def write(self, data: bytes) -> bool:
         """Send without waiting; return false without a peer or connection, or if the buffer is full."""
-        ...
 
     def adopt(self, peer: Peer) -> None:
         """Send to `peer` from now on."""
-        ...
 
     def wake(self) -> None:
         """Make a `read` of another thread return at once."""
-        ...
 
     def close(self) -> None: ...
 
@@ -101,7 +96,6 @@ class UdpTransport:
             self._socket.close()
             raise _cannot_open(f"udp port {local[1]} of {local[0]}", error) from error
         self._waiter = _Waiter()
-        self._waiter.watch(self._socket.fileno())
         self._remote = remote
 
     @property
@@ -110,7 +104,8 @@ class UdpTransport:
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         datagrams: list[tuple[bytes, Peer]] = []
-        if self._waiter.wait(timeout_s):
+        is_readable, _ = self._waiter.wait(timeout_s, self._socket.fileno())
+        if is_readable:
             with contextlib.suppress(BlockingIOError):
                 while len(datagrams) < BATCH:
                     datagrams.append(self._socket.recvfrom(LARGEST_READ))
@@ -172,12 +167,11 @@ class StreamTransport:
             self._waiter.wait(min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0)))
             self._reopen()
             return []
-        self._waiter.watch(self._stream.fileno(), writable=bool(self._backlog))
-        events = self._waiter.wait(timeout_s)
-        if events & selectors.EVENT_WRITE:
+        is_readable, is_writable = self._waiter.wait(timeout_s, self._stream.fileno(), writes=bool(self._backlog))
+        if is_writable:
             with self._writing:
                 self._flush(self._stream)
-        data = self._receive(self._stream) if events & selectors.EVENT_READ else b""
+        data = self._receive(self._stream) if is_readable else b""
         return [(data, self._peer)] if data else []
 
     def write(self, data: bytes) -> bool:
@@ -223,7 +217,6 @@ class StreamTransport:
             self._is_broken = True
 
     def _break(self) -> None:
-        self._waiter.forget()
         with self._writing:
             if self._stream is not None:
                 self._stream.close()
@@ -242,48 +235,31 @@ class StreamTransport:
 
 
 class _Waiter:
-    """Waits for one descriptor, or for `wake` from another thread."""
+    """Waits for a descriptor, or for `wake` from another thread."""
 
     def __init__(self) -> None:
-        self._selector = selectors.DefaultSelector()
         self._wake_receiver, self._wake_sender = socket.socketpair()
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
-        self._selector.register(self._wake_receiver, selectors.EVENT_READ)
-        self._watched: int | None = None
-        self._events = 0
 
-    def watch(self, descriptor: int, *, writable: bool = False) -> None:
-        """Watch `descriptor` for readability, and with `writable` also for writability."""
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writable else 0)
-        if self._watched is None:
-            self._selector.register(descriptor, events)
-        elif events != self._events:
-            self._selector.modify(descriptor, events)
-        self._watched, self._events = descriptor, events
-
-    def forget(self) -> None:
-        if self._watched is not None:
-            self._selector.unregister(self._watched)
-        self._watched = None
-
-    def wait(self, timeout_s: float) -> int:
-        """Return the events of the watched descriptor, 0 after the timeout or a wake."""
-        found = 0
-        for key, events in self._selector.select(max(timeout_s, 0.0)):
-            if key.fd == self._watched:
-                found = events
-            else:
-                with contextlib.suppress(BlockingIOError):
-                    self._wake_receiver.recv(LARGEST_READ)
-        return found
+    def wait(self, timeout_s: float, descriptor: int | None = None, *, writes: bool = False) -> tuple[bool, bool]:
+        """Return whether the descriptor is readable, and with `writes` writable; neither after a timeout or wake."""
+        polled = select.poll()
+        polled.register(self._wake_receiver, select.POLLIN)
+        if descriptor is not None:
+            polled.register(descriptor, select.POLLIN | (select.POLLOUT if writes else 0))
+        found = dict(polled.poll(max(timeout_s, 0.0) * 1000.0))
+        if self._wake_receiver.fileno() in found:
+            with contextlib.suppress(BlockingIOError):
+                self._wake_receiver.recv(LARGEST_READ)
+        events = 0 if descriptor is None else found.get(descriptor, 0)
+        return bool(events & ~select.POLLOUT), bool(events & ~select.POLLIN)
 
     def wake(self) -> None:
         with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
             self._wake_sender.send(b"!")
 
     def close(self) -> None:
-        self._selector.close()
         self._wake_receiver.close()
         self._wake_sender.close()
 

@@ -1,8 +1,8 @@
 """Execution of a trial: passes received packets and requests to the trial machine, and carries out its commands."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from app.autopilots.commands import Action, Outgoing, Target, read_parameter
 from app.autopilots.measurements import Position
 from app.vehicles.base import Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import Requester, StopRequest
+from app.vehicles.mavlink.command_sequence import CommandSequence
 from app.vehicles.mavlink.events import (
     ActionRefused,
     Command,
@@ -31,10 +32,13 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import advance, begin
-from app.vehicles.mavlink.trial_state import LANDING, Plan, State, Trial
+from app.vehicles.mavlink.trial_state import LANDING, State
+
+T = TypeVar("T")
 
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""
@@ -52,19 +56,6 @@ _SAMPLE_EVERY_S: Final = 0.015
 """Minimum interval of live telemetry; records keep every sample."""
 
 
-@dataclass(frozen=True, slots=True)
-class TrialResult:
-    """Final state and samples of a trial; `error` is the first exception of the caller's functions. `offset_s` converts
-    the vehicle's clock to ours, by the packet with the least latency; `reference` computes the autopilot's own
-    reference, if it does not send it."""
-
-    trial: Trial
-    samples: tuple[RecordSample, ...]
-    offset_s: float
-    error: BaseException | None
-    reference: Reference | None = None
-
-
 def _no_secondary() -> Sequence[SecondaryAltitudeReceived]:
     return ()
 
@@ -75,6 +66,9 @@ class TrialRunner:
     `restore` writes the safe gains, reads them back, and returns the problem, or an empty string. `look` returns the
     samples of the second source of altitude since the last call; `channels` converts a record's sample and a datum to
     the channels of live telemetry; `reference` computes the autopilot's own reference, if it does not send it.
+
+    Then it has flown: `trial` is its state, `samples` its record, `error` the first exception of the caller's
+    functions. `offset_s` converts the vehicle's clock to ours, by the packet with the least latency.
     """
 
     def __init__(
@@ -90,55 +84,45 @@ class TrialRunner:
         look: Callable[[], Sequence[SecondaryAltitudeReceived]] = _no_secondary,
         reference: Reference | None = None,
     ) -> None:
-        self._reference = reference
+        self.reference = reference
         self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
         self._loop = replace(radio.seen.loop)
-        self._offset_s = float("inf")
+        self.offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
-        self._samples: list[RecordSample] = []
+        self.samples: list[RecordSample] = []
         self._sequence: CommandSequence | None = None
         self._target = radio.target
         self._stream: tuple[Outgoing, ...] = ()
         self._streamed_s = float("-inf")
-        self._error: BaseException | None = None
+        self.error: BaseException | None = None
         self._shown_s = float("-inf")
         self._listened_s = self._sank_s = radio.clock.now_s()
         self._listens_first = False
         self._sank_to_m = float("inf")
-        self._trial, commands = begin(plan, watch, radio.clock.now_s())
+        self.trial, commands = begin(plan, watch, radio.clock.now_s())
         self._begin_with = commands
-
-    @property
-    def state(self) -> State:
-        return self._trial.state
-
-    @property
-    def datum_m(self) -> float:
-        """Zero of the record's altitudes, on the vehicle's own datum."""
-        return self._trial.plan.datum_m
 
     @property
     def trouble(self) -> str:
         """Message that the vehicle does not land although commanded to; otherwise empty."""
-        trial, now_s = self._trial, self._radio.clock.now_s()
+        trial, now_s = self.trial, self._radio.clock.now_s()
         if trial.state not in LANDING or now_s - self._sank_s < NOT_DESCENDING_AFTER_S:
             return ""
         return NOT_DESCENDING if trial.watch.positions.is_airborne(now_s, trial.plan.ground_m) else ""
 
     def _note_sinking(self) -> None:
         """Note since when the vehicle has not descended by `SINKS_M`."""
-        trial, last = self._trial, self._trial.watch.last
+        trial, last = self.trial, self.trial.watch.last
         altitude_m = float("inf") if last is None else last.altitude_m
         if trial.state not in LANDING or altitude_m < self._sank_to_m - SINKS_M:
             self._sank_s, self._sank_to_m = self._radio.clock.now_s(), altitude_m
 
-    def fly(self) -> TrialResult:
+    def fly(self) -> None:
         """Run until the trial is over. Any exception, even one that would end the program, first lands the vehicle."""
         self._guarded(lambda: self._carry_out(self._begin_with, self._radio.clock.now_s()))
-        while not self._trial.is_over:
+        while not self.trial.is_over:
             self._guarded(self._listen)
             self._guarded(self._evaluate)
-        return TrialResult(self._trial, tuple(self._samples), self._offset_s, self._error, self._reference)
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
@@ -147,7 +131,15 @@ class TrialRunner:
             self._radio.clock.wait_s(LISTEN_S)
             self._listened_s = self._radio.clock.now_s()
         except BaseException as error:  # noqa: BLE001 - kept for the caller; the vehicle comes first
-            self._error = self._error or error
+            self.error = self.error or error
+
+    def _kept(self, work: Callable[[], T]) -> T | None:
+        """Result of a function of the caller; its exception is kept: the vehicle comes first."""
+        try:
+            return work()
+        except BaseException as error:  # noqa: BLE001
+            self.error = self.error or error
+            return None
 
     def _listen(self) -> None:
         paused_s = self._keep_streaming()
@@ -157,7 +149,7 @@ class TrialRunner:
         if stalled_s > STALL_S:
             packets += self._radio.receive(LISTEN_S)
         self._listened_s = now_s
-        if self._trial.state is State.ARM and stalled_s > LONGEST_STALL_S * self._radio.timeout_factor:
+        if self.trial.state is State.ARM and stalled_s > LONGEST_STALL_S * self._radio.timeout_factor:
             why = f"Gainline stalled for {stalled_s:.0f} s, so the takeoff was not commanded."
             self._advance(ActionRefused(Action.ARM, why, now_s))
         for each in in_order(packets, self._look()):
@@ -177,10 +169,10 @@ class TrialRunner:
         after a stall of this program many packets are received at once."""
         self._loop.note(packet.measurement, packet.now_s)
         if isinstance(packet.measurement, Position):
-            self._offset_s = min(self._offset_s, packet.now_s - packet.measurement.time_boot_s)
+            self.offset_s = min(self.offset_s, packet.now_s - packet.measurement.time_boot_s)
 
     def _evaluate(self) -> None:
-        if self._trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
+        if self.trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
             self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
             self._advance(StopRequested(stop, self._radio.clock.now_s()))
@@ -192,22 +184,15 @@ class TrialRunner:
 
     def _wanted(self) -> StopRequest | None:
         """Return the stop request. An internal error lands the vehicle; a request for motors off takes precedence."""
-        stop = self._call_should_stop()
-        if self._error is None or (stop is not None and stop.motors_off):
+        stop = self._kept(self._should_stop)
+        if self.error is None or (stop is not None and stop.motors_off):
             return stop
-        return StopRequest(_describe_error(self._error), by=Requester.INTERNAL_ERROR)
-
-    def _call_should_stop(self) -> StopRequest | None:
-        try:
-            return self._should_stop()
-        except BaseException as error:  # noqa: BLE001 - kept for the caller; it is called again
-            self._error = self._error or error
-            return None
+        return StopRequest(_describe_error(self.error), by=Requester.INTERNAL_ERROR)
 
     def _advance(self, event: Event) -> None:
-        before = self._trial.state
-        self._trial, commands = advance(self._trial, event)
-        if self._trial.state is not before:
+        before = self.trial.state
+        self.trial, commands = advance(self.trial, event)
+        if self.trial.state is not before:
             self._sequence, self._stream = None, ()  # the commands of the previous state are obsolete
         self._carry_out(commands, event.now_s)
 
@@ -242,7 +227,7 @@ class TrialRunner:
 
     def _place(self, action: Action) -> Target:
         """Return the target of set points at the place where the vehicle hovers when it begins to hold the first."""
-        last = self._trial.watch.last
+        last = self.trial.watch.last
         if action is not Action.HOLD or last is None:
             return self._target
         return replace(self._target, north_m=last.north_m, east_m=last.east_m)
@@ -263,15 +248,15 @@ class TrialRunner:
     def _reference_m(self, position: Position, now_s: float) -> float | None:
         """Return the autopilot's own reference at the time of receipt of a position, on the vehicle's datum; None if it
         is not known or needed."""
-        trial = self._trial
+        trial = self.trial
         if len(trial.plan.set_points.times_s) == 1 or trial.commanded_boot_s is None:
             return None
-        if self._reference is None:
+        if self.reference is None:
             source = self._radio.profile.reference
             return self._loop.reference_at(source, position.altitude_m, now_s)
         time_s = np.array([position.time_boot_s - trial.commanded_boot_s])
         flown = at_last_times(trial.plan.takeoff, trial.set_points.changes)
-        return float(self._reference(flown, time_s)[0]) + trial.plan.datum_m
+        return float(self.reference(flown, time_s)[0]) + trial.plan.datum_m
 
     def _restored(self) -> str:
         try:
@@ -279,24 +264,19 @@ class TrialRunner:
         except VehicleError as error:
             return str(error)
         except BaseException as error:  # noqa: BLE001 - kept for the caller; retried, because the gains come first
-            self._error = self._error or error
+            self.error = self.error or error
             return self._restore()
 
     def _record_sample(self, sample: RecordSample) -> None:
-        self._samples.append(sample)
-        start_s = self._trial.commanded_boot_s
-        if start_s is None or self._error is not None:
+        self.samples.append(sample)
+        start_s = self.trial.commanded_boot_s
+        if start_s is None or self.error is not None:
             return
         time_s = sample.position.time_boot_s - start_s
         if time_s >= 0.0 and time_s - self._shown_s >= _SAMPLE_EVERY_S:
             self._shown_s = time_s
-            self._show(Sample(time_s, self._channels(sample, self.datum_m)))
-
-    def _show(self, sample: Sample) -> None:
-        try:
-            self._on_sample(sample)
-        except BaseException as error:  # noqa: BLE001 - kept for the caller; the commands that follow must be sent
-            self._error = error
+            shown = Sample(time_s, self._channels(sample, self.trial.plan.datum_m))
+            self._kept(lambda: self._on_sample(shown))
 
 
 def _describe_error(error: BaseException) -> str:

@@ -13,7 +13,7 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     confirms_motors_off,
 )
-from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, Finding, land_every_s
+from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, land_every_s
 from app.vehicles.mavlink.monitors.positions import DRIFT_M
 from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_findings import (
@@ -49,9 +49,10 @@ def landing(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if trial.safe_gains is not None and trial.safe_gains.awaited is not None:
         return send_gains(trial, trial.safe_gains, event)
+    watch = trial.watch
     if finding := (
         find_taken_over(trial)
-        or (_find_envelope(trial) if trial.safe_gains is None else None)
+        or (watch.envelope.find(trial.plan, watch.last, settling=False) if trial.safe_gains is None else None)
         or (find_change(trial) if trial.state is State.LAND else None)
     ):
         return fail(trial, finding, now_s)
@@ -65,12 +66,8 @@ def landing(trial: Trial, event: Event) -> Step:
     return trial, ()
 
 
-def _find_envelope(trial: Trial) -> Finding | None:
-    return trial.watch.envelope.find(trial.plan.limits, trial.watch.last, trial.plan.ground_m, settling=False)
-
-
 def _is_land_due(trial: Trial, now_s: float) -> bool:
-    every_s = land_every_s(now_s - trial.since_s, trial.plan.land_again_s)
+    every_s = land_every_s(now_s - trial.since_s, trial.plan.autopilot.land_again_s)
     return now_s - trial.repeated_s >= every_s and not may_be_by_hand(trial, now_s)
 
 
@@ -140,7 +137,7 @@ def disarming(trial: Trial, event: Event) -> Step:
         trial = replace(trial, remarks=(*trial.remarks, *confirmed), contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     watch, plan = trial.watch, trial.plan
-    stands = trial.takeoff is None and watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)
+    stands = trial.takeoff is None and watching.stands_by_own_account(watch, now_s, plan)
     airborne = watch.modes.armed and watch.positions.is_airborne(now_s, plan.ground_m)
     if airborne and not (stands or trial.stopped):
         why = "It was in the air when its motors were to be stopped."
@@ -167,7 +164,9 @@ def _answered(trial: Trial, event: Event) -> Trial:
     if trial.takeoff is None:
         return trial
     measurement = event.measurement if isinstance(event, PacketReceived) else None
-    answered = confirms_motors_off(measurement, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
+    answered = (
+        confirms_motors_off(measurement, trial.plan.autopilot.stop_settings) and trial.repeated_s >= trial.since_s
+    )
     return replace(trial, answered=trial.answered or answered)
 
 
@@ -177,7 +176,7 @@ def _is_stopped(trial: Trial, event: Event) -> bool:
         return False
     if trial.takeoff is None:  # a heartbeat may have been under way since before it armed
         since_s = max(trial.watch.modes.armed_since_s, trial.since_s)
-        return event.now_s - since_s >= trial.plan.limits.confirmation_s
+        return event.now_s - since_s >= trial.plan.confirmation_s
     return trial.answered or trial.watch.modes.is_disarmed
 
 
@@ -193,12 +192,12 @@ def restoring(trial: Trial, event: Event) -> Step:
 
 def _confirms_landing(trial: Trial, now_s: float) -> bool:
     """Whether telemetry confirms that the vehicle is landing: it descends, or is near the ground."""
-    positions, modes, limits = trial.watch.positions, trial.watch.modes, trial.plan.limits
+    positions, modes, autopilot = trial.watch.positions, trial.watch.modes, trial.plan.autopilot
     last = positions.last
     if last is None or not positions.is_fresh(now_s):
         return False
     is_new = now_s - modes.block_s < _LANDING_BLOCK_S
-    lands = is_new and modes.block in limits.landing_blocks  # another Land would begin its landing again
-    lands = lands or modes.agreed in limits.landing_modes - limits.flying_modes
+    lands = is_new and modes.block in autopilot.landing_blocks  # another Land would begin its landing again
+    lands = lands or modes.agreed in autopilot.landing_modes - autopilot.flying_modes
     near = not positions.is_airborne(now_s, trial.plan.ground_m)
     return (near and (lands or not find_doubt_of_descent(trial, now_s))) or last.climb_rate_m_s < DESCENDING_M_S

@@ -27,11 +27,12 @@ from app.vehicles.mavlink.monitors.positions import DRIFT_M
 from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
 from app.vehicles.mavlink.monitors.settings import SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_findings import allowed_modes
 from app.vehicles.mavlink.trial_phases import HANDLERS
 from app.vehicles.mavlink.trial_reactions import fail, measure_ground, note, note_cause, stop_motors
-from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, Plan, State, Step, Trial
+from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, State, Step, Trial
 
 _REPLY_S: Final = 0.5
 """Interval at which a reply after the takeoff command is requested."""
@@ -64,9 +65,7 @@ def advance(trial: Trial, event: Event) -> Step:
         trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=watching.note_duplicate(trial.watch, event.why))
-    settled = watching.settle(
-        trial.watch, event.now_s, trial.plan.ground_m, trial.plan.limits, commanded=trial.takeoff is not None
-    )
+    settled = watching.settle(trial.watch, event.now_s, trial.plan, commanded=trial.takeoff is not None)
     trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
     trial, polls = _poll_settings(trial, event.now_s)
@@ -77,7 +76,7 @@ def advance(trial: Trial, event: Event) -> Step:
 
 def _poll_settings(trial: Trial, now_s: float) -> Step:
     """Request the mode of a vehicle whose heartbeats do not distinguish all modes, and settings in doubt."""
-    mode = trial.plan.mode_parameter
+    mode = trial.plan.autopilot.mode_parameter
     names = trial.settings.suspects if mode is None else trial.settings.suspects | {mode.name}
     if not names or trial.state not in STATES_WITH_TRIAL_GAINS or now_s - trial.settings.polled_s < REPEAT_S:
         return trial, ()
@@ -102,7 +101,7 @@ def _confirm_take_off(trial: Trial, event: Event) -> Step:
 
 
 def _process_packet(trial: Trial, event: PacketReceived) -> Step:
-    watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
+    watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan)
     trial = _with_disarmed_height(trial, watch, event.now_s)
     trial, requests = _check_settings(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.identity.rebooted:
@@ -112,7 +111,7 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     elif trial.state is State.RECORD:
         trial = set_point_schedule.note_settling(trial, positions) if positions else trial
         trial = _with_target(trial, event) if trial.plan.holds_first else trial
-    to_m = trial.plan.ground_m if trial.state not in STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
+    to_m = trial.plan.ground_m if trial.state not in STATES_WITH_TRIAL_GAINS else trial.plan.set_point_m
     samples = (RecordSample(each, to_m, watch.battery.voltage_v, watch.second.altitude_m) for each in positions)
     return trial, (*requests, *samples)
 
@@ -122,8 +121,8 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
     so for the first time."""
     if not isinstance(measurement, Parameter) or trial.state not in {State.ARM, *STATES_WITH_TRIAL_GAINS}:
         return trial, ()
-    plan, suspects = trial.plan, trial.settings.suspects
-    settings, finding = trial.settings.update(measurement, plan.trial_gains, plan.mode_parameter, plan.limits)
+    suspects = trial.settings.suspects
+    settings, finding = trial.settings.update(measurement, trial.plan)
     trial = replace(trial, settings=settings)
     is_new = len(settings.suspects) > len(suspects)
     return trial if finding is None else note(trial, finding), (RequestGain(measurement.name),) if is_new else ()
@@ -131,8 +130,7 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
 
 def _with_target(trial: Trial, event: PacketReceived) -> Trial:
     """Note that the vehicle follows another set point than it was commanded to."""
-    wanted_m, following_modes = trial.plan.limits.set_point_m, trial.plan.following_modes
-    set_points, finding = trial.set_points.update(event.measurement, event.now_s, wanted_m, following_modes)
+    set_points, finding = trial.set_points.update(event.measurement, event.now_s, trial.plan)
     trial = trial if set_points is trial.set_points else replace(trial, set_points=set_points)
     return trial if finding is None else note(trial, finding)
 
@@ -151,7 +149,7 @@ def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
     is_unchanged = watch.modes is trial.watch.modes
     if is_unchanged or trial.state not in STATES_WITH_TRIAL_GAINS or not allowed_modes(trial):
         return trial
-    finding = watch.modes.find_interruption(trial.watch.modes, trial.plan.limits)
+    finding = watch.modes.find_interruption(trial.watch.modes, trial.plan)
     return trial if finding is None else note(trial, finding)
 
 
@@ -159,7 +157,7 @@ def _with_fall(trial: Trial, now_s: float) -> Trial:
     """Note a fall in any state, unless a person has requested motors off."""
     if trial.stopped or trial.takeoff is None or trial.fell_s is not None:
         return trial
-    fall = trial.watch.positions.find_fall(trial.plan.limits, trial.plan.ground_m)
+    fall = trial.watch.positions.find_fall(trial.plan.ground_m)
     return trial if fall is None else replace(note(trial, fall), contact=Landing.FELL, fell_s=now_s)
 
 
@@ -183,7 +181,7 @@ def _with_drift(trial: Trial, now_s: float) -> Trial:
         return trial
     watch, plan = trial.watch, trial.plan
     is_told_to_land = trial.state not in STATES_WITH_TRIAL_GAINS
-    has_landed = is_told_to_land and watching.has_reported_landing(watch, now_s, plan.limits)
+    has_landed = is_told_to_land and watching.has_reported_landing(watch, now_s, plan)
     drift = watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed)
     trial = trial if drift is None else note_cause(trial, drift)
     contradiction = watch.ground.find_contradiction(now_s)

@@ -60,14 +60,14 @@ def _arm(trial: Trial, event: Event) -> Step:
         return fail(measure_ground(trial, now_s), Finding(Failure.NOT_ARMED, event.why), now_s)
     if finding := find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED):
         return fail(measure_ground(trial, now_s), finding, now_s)
-    if finding := watching.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
+    if finding := watching.find_on_ground(trial.watch, trial.plan, now_s) or _not_armed(trial, event):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
     trial = measure_ground(replace(trial, watch=watching.begin_climb(trial.watch, last.altitude_m)), now_s)
     watch, plan = trial.watch, trial.plan
-    stands = watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)
+    stands = watching.stands_by_own_account(watch, now_s, plan)
     if finding := (
         watch.positions.find_departure(plan.ground_m, stands=stands)
         or watch.second.find_disagreement_on_ground(last.altitude_m, trial.ground_shift_m, now_s)
@@ -116,13 +116,13 @@ def _take_off(trial: Trial, event: Event) -> Step:
 
 
 def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
-    watch, is_late = trial.watch, _waited_s(trial) > trial.plan.lift_off_s
+    watch, lift_off_s = trial.watch, trial.plan.autopilot.lift_off_s
     decides_soon = not watch.modes.armed or watch.positions.unchanged_s > _STUCK_S
-    if not is_late or decides_soon or not watch.positions.is_fresh(now_s):
+    if _waited_s(trial) <= lift_off_s or decides_soon or not watch.positions.is_fresh(now_s):
         return None
     if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
         return Finding(Failure.LOST_POSITION, "It reports that it flies, but its altitude stayed on the ground.")
-    return Finding(Failure.NO_LIFT_OFF, f"It was still on the ground {trial.plan.lift_off_s:g} s after the command.")
+    return Finding(Failure.NO_LIFT_OFF, f"It was still on the ground {lift_off_s:g} s after the command.")
 
 
 def _waited_s(trial: Trial) -> float:
@@ -154,7 +154,7 @@ def _record(trial: Trial, event: Event) -> Step:
     for finding in (
         watch.positions.find_glitches(),
         trial.settings.find_unconfirmed() or watch.climb.find_sunken(watch.last, lowest_m, plan.ground_m),
-        watch.climb.find_incomplete(plan.climb_to_m) if plan.climbs_from_ground else None,
+        watch.climb.find_incomplete(plan.climb_to_m) if plan.autopilot.climbs_from_ground else None,
     ):
         trial = trial if finding is None else note(trial, finding)
     return land(trial, State.LAND, now_s)

@@ -39,7 +39,7 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
     is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
     is_in_place = stood[-1].away_m(watch.envelope.origin or stood[-1]) <= _IN_PLACE_M
     shift_m = statistics.median(altitudes_m) - plan.ground_m
-    may_shift = plan.climbs_from_ground or abs(shift_m) <= _SHIFT_M
+    may_shift = plan.autopilot.climbs_from_ground or abs(shift_m) <= _SHIFT_M
     if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
         return trial
     return replace(
@@ -138,7 +138,7 @@ def find_doubt_of_ground(trial: Trial, now_s: float) -> str:
 def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     """Return why a position on the ground does not show that the vehicle stayed or came down there: it may yet take
     off; it does not report a landing although it can; or it cannot, and was not observed climbing or descending."""
-    watch, landed_blocks = trial.watch, trial.plan.limits.landed_blocks
+    watch, landed_blocks = trial.watch, trial.plan.autopilot.landed_blocks
     if trial.may_take_off:
         return "it has not replied since the takeoff command, which may still be under way"
     if trial.takeoff is None:
@@ -172,7 +172,7 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
     or it has not been commanded to take off and nothing shows that it moved."""
     watch, ground_m = trial.watch, trial.plan.ground_m
-    stands = watching.stands_by_own_account(watch, now_s, ground_m, trial.plan.limits)
+    stands = watching.stands_by_own_account(watch, now_s, trial.plan)
     is_arming = trial.state is State.ARM and not watching.is_said_to_fly(watch, now_s, ground_m)
     if trial.takeoff is None and (stands or is_arming):
         return ""

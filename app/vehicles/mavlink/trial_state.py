@@ -1,24 +1,20 @@
-"""State of one trial on a MAVLink vehicle: its states, its plan, and what is known of it."""
+"""State of one trial on a MAVLink vehicle: its states, and what is known of it."""
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from app.autopilots.autopilot import ModeParameter
 from app.autopilots.commands import Setting
 from app.autopilots.measurements import Position
-from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
-from app.core.models.set_points import SetPoints
-from app.vehicles.base import RECORDED_BEYOND_S
 from app.vehicles.end_texts import joined, request_text
 from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink.events import Command
-from app.vehicles.mavlink.failures import RESPONSES, Failure, Limits, Outcome
+from app.vehicles.mavlink.failures import RESPONSES, Failure, Outcome
 from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
 from app.vehicles.mavlink.monitors.settings import SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.plan import Plan
 
 
 class State(StrEnum):
@@ -81,74 +77,6 @@ STATES_WITH_TRIAL_GAINS: Final = frozenset({State.TAKEOFF, State.RECORD})
 OVER: Final = frozenset({State.IDLE, State.QUARANTINE})
 QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
 """States in which only Land and motors off may be sent, until a person releases the vehicle."""
-
-
-RECORD_S: Final = WINDOW_S + RECORDED_BEYOND_S
-"""Length of the record for the default window."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
-    """Plan of a trial.
-
-    `safe_gains` are in the order in which an abort sends them; `ground_m` is the ground on the vehicle's datum;
-    `climbs_from_ground`: the commanded altitude counts from there; `record_s`: length of the record after the takeoff
-    command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again;
-    `set_points`: the takeoff's altitude, and those that follow, in the record's altitude; `holds_first`: the second of
-    them is the takeoff's again, commanded by `Action.HOLD`, after which the vehicle may only be in `following_modes`
-    until it lands. The set point of `limits` is the current one. `trial_gains` are those that it was seen to hold;
-    `mode_parameter` is its mode as a parameter, if its heartbeats do not distinguish all modes.
-    """
-
-    safe_gains: tuple[Setting, ...]
-    trial_gains: tuple[Setting, ...] = ()
-    mode_parameter: ModeParameter | None = None
-    limits: Limits
-    ground_m: float
-    set_points: SetPoints = SET_POINTS
-    holds_first: bool = False
-    following_modes: frozenset[str] = frozenset()
-    climbs_from_ground: bool = False
-    record_s: float = RECORD_S
-    lift_off_s: float = 1.5
-    land_again_s: float = 1.0
-    stop_settings: tuple[str, ...] = ()
-
-    @property
-    def slow_s(self) -> float:
-        """Longest delay of the vehicle's clock behind ours at the end of the record: its share of a longer record is
-        that of the default one."""
-        return self.limits.slow_s * max(1.0, self.record_s / RECORD_S)
-
-    @property
-    def datum_m(self) -> float:
-        """Zero of the record's altitude, on the vehicle's datum."""
-        return self.ground_m if self.climbs_from_ground else 0.0
-
-    @property
-    def takeoff(self) -> SetPoints:
-        """The takeoff's set point alone."""
-        return SetPoints(self.set_points.times_s[:1], self.set_points.altitudes_m[:1])
-
-    @property
-    def first_step(self) -> int:
-        """Place of the first step among the set points."""
-        return 2 if self.holds_first else 1
-
-    @property
-    def climb_to_m(self) -> float:
-        """First set point, on the vehicle's datum."""
-        return self.set_points.altitudes_m[0] + self.datum_m
-
-    def with_set_point(self, set_point_m: float) -> "Plan":
-        """Return the plan with another current set point, on the vehicle's datum."""
-        limits = dataclasses.replace(self.limits, set_point_m=set_point_m)
-        return dataclasses.replace(self, limits=limits)
-
-    def on_ground_at(self, ground_m: float) -> "Plan":
-        """Return the plan with another height of the ground."""
-        moved = dataclasses.replace(self, ground_m=ground_m)
-        return moved.with_set_point(self.limits.set_point_m + moved.datum_m - self.datum_m)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,13 +18,13 @@ from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flight_preparation import flies_steps
 from app.vehicles.mavlink.flown_set_points import Reference, with_flown_set_points
-from app.vehicles.mavlink.ground_observation import Ground
+from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.parameters import written
 from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from app.vehicles.mavlink.set_point_schedule import referred_from_s
 from app.vehicles.mavlink.transports import LinkError
-from app.vehicles.mavlink.trial import TrialResult, TrialRunner
+from app.vehicles.mavlink.trial import TrialRunner
 from app.vehicles.mavlink.trial_state import State, Trial
 
 STANDSTILL_S: Final = 1.0
@@ -55,7 +55,7 @@ class MavlinkVehicle(VehicleConnection):
 
     def condition(self) -> Condition:
         """Return the state last received, without waiting. Altitude counts as in a record."""
-        state = self._quarantine.state if self._flight is None else self._flight.state
+        state = self._quarantine.state if self._flight is None else self._flight.trial.state
         problem = self._radio.link.log_problem
         troubles = (
             f"The telemetry log {problem}." if problem else "",
@@ -66,7 +66,7 @@ class MavlinkVehicle(VehicleConnection):
         )
         return self._status_reader.read(
             step=self._quarantine.reported_step(state, is_flying=self._is_starting or self._is_flying),
-            datum_m=self._datum_m if self._flight is None else self._flight.datum_m,
+            datum_m=self._datum_m if self._flight is None else self._flight.trial.plan.datum_m,
             held=self._gains.held,
             trouble=" ".join(trouble for trouble in troubles if trouble),
         )
@@ -166,7 +166,7 @@ class MavlinkVehicle(VehicleConnection):
         self._quarantine.require_none()
         self._loop = flight_preparation.prepare_set_points(self._radio, self._gains.release)
 
-    def _observe_ground(self, order: FlightOptions) -> Ground:
+    def _observe_ground(self, order: FlightOptions) -> GroundObservation:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         needed = preflight.evaluate_set_point_requirements(self._radio) if flies_steps(order) else ()
         watched, items = self._check(STANDSTILL_S)
@@ -174,16 +174,16 @@ class MavlinkVehicle(VehicleConnection):
         needed = (*flight_preparation.evaluate_time(order, self._radio, self._options), *needed, *hover)
         self._quarantine.require_none()
         preflight.require((*items, *needed, preflight.evaluate_set_points(order.set_points)))
-        return watched.ground
+        return watched
 
     def _fly(
         self,
-        ground: Ground,
+        ground: GroundObservation,
         order: FlightOptions,
         reference: Reference | None,
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
-    ) -> TrialResult:
+    ) -> TrialRunner:
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._quarantine.enter(State.ARM)
@@ -198,7 +198,7 @@ class MavlinkVehicle(VehicleConnection):
         )
         if self._secondary is not None:
             self._secondary.align(ground.secondary_m, ground.altitude_m)
-        self._flight = TrialRunner(
+        flown = self._flight = TrialRunner(
             self._radio,
             plan,
             watch,
@@ -210,9 +210,9 @@ class MavlinkVehicle(VehicleConnection):
             reference=reference,
         )
         try:
-            flown = self._flight.fly()
+            flown.fly()
         finally:
-            self._datum_m, self._flight = self._flight.datum_m, None
+            self._datum_m, self._flight = flown.trial.plan.datum_m, None
         self._quarantine.state, self._quarantine.why = flown.trial.state, flown.trial.why
         if self._repeated is None:  # else it is of a request during the restoring of the safe gains
             self.has_stopped = self._radio.is_disarmed or flown.trial.has_confirmed_stop
@@ -223,7 +223,7 @@ class MavlinkVehicle(VehicleConnection):
     def _keep_landing(self, trial: Trial) -> None:
         """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
         it."""
-        by_hand = trial.watch.modes.find_taken_over(trial.plan.limits) is not None
+        by_hand = trial.watch.modes.find_taken_over(trial.plan) is not None
         is_disarmed = self._radio.is_disarmed or trial.has_confirmed_stop
         if not by_hand and not is_disarmed and self._repeated is None:
             with suppress(LinkError):
@@ -236,7 +236,7 @@ class MavlinkVehicle(VehicleConnection):
     def _scored(self) -> Scored:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
-    def _record(self, flown: TrialResult, ground: Ground) -> FlightRecord:
+    def _record(self, flown: TrialRunner, ground: GroundObservation) -> FlightRecord:
         """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
         aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
@@ -273,7 +273,7 @@ class MavlinkVehicle(VehicleConnection):
             settings={**self._options, **self._loop, **both.settings},
         )
 
-    def _not_begun(self, ground: Ground, end: FlightEnd) -> FlightRecord:
+    def _not_begun(self, ground: GroundObservation, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         datum_m = ground.altitude_m if self._radio.profile.climbs_from_ground else 0.0

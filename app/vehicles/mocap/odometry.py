@@ -88,11 +88,6 @@ class OdometrySource:
             tracking_valid=pose.tracking_valid,
         )
 
-    @property
-    def has_received(self) -> bool:
-        """Whether any odometry has arrived yet."""
-        return self._stream.newest is not None
-
     def take(self) -> Sequence[SourceSample]:
         return self._stream.take()
 
@@ -100,15 +95,14 @@ class OdometrySource:
         """Do nothing: the link belongs to the vehicle."""
 
 
-class StreamSource:
+class StreamSource(OdometrySource):
     """Odometry on its own link, received in its own thread. Nothing is sent; the first peer that sends odometry is
     used."""
 
     def __init__(self, address: StreamAddress, clock: Clock) -> None:
         """Wait for the first odometry. Raises LinkError if the address cannot be opened, VehicleError if none
         arrives."""
-        self._inner: Final = OdometrySource(f"odometry at {address}", clock)
-        self._clock = clock
+        super().__init__(f"odometry at {address}", clock)
         self._transport = open_transport(address.link)
         self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
         self._closing = threading.Event()
@@ -121,18 +115,11 @@ class StreamSource:
             raise
 
     @property
-    def name(self) -> str:
-        return self._inner.name
-
-    @property
     def trouble(self) -> str:
-        return self._inner.trouble if self._thread.is_alive() else f"Reception of {self.name} has stopped."
+        return super().trouble if self._thread.is_alive() else f"Reception of {self.name} has stopped."
 
     def on_message(self, received: Received) -> None:
         """Ignore messages of the vehicle's link."""
-
-    def take(self) -> Sequence[SourceSample]:
-        return self._inner.take()
 
     def close(self) -> None:
         """Close the link; calling it again has no effect."""
@@ -143,7 +130,7 @@ class StreamSource:
 
     def _await_odometry(self, address: StreamAddress) -> None:
         until_s = time.monotonic() + RECEIVED_WITHIN_S
-        while not self._inner.has_received:
+        while self._stream.newest is None:
             if time.monotonic() > until_s:
                 raise VehicleError(
                     f"No ODOMETRY and no VISION_POSITION_ESTIMATE arrived at {address} within {RECEIVED_WITHIN_S:g} s.",
@@ -169,4 +156,4 @@ class StreamSource:
             self._transport.adopt(peer)
         now_s = self._clock.now_s()
         for message in messages:
-            self._inner.on_message(Received(message, now_s))
+            super().on_message(Received(message, now_s))

@@ -17,7 +17,7 @@ from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, Px4ArmingChec
 from app.autopilots.px4.simulated import Px4
 from app.autopilots.simulated.body import OutgoingMessage
 from app.simdrone import faults
-from app.simdrone.faults import Fault, FaultTarget
+from app.simdrone.fault_kinds import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import STANDSTILL_S, MavlinkVehicle
@@ -64,7 +64,7 @@ def test_the_first_connection_reads_the_gains_and_writes_nothing(autopilot: str)
     """Seen: 0.3 overwritten with 0.5, for good."""
     name = "PSC_ACCZ_P" if autopilot == "ardupilot" else "MPC_Z_P"
     with ready(autopilot) as rig:
-        rig.drone.autopilot.parameters[name] = 0.3  # type: ignore[attr-defined]
+        rig.drone.autopilot.parameters[name] = 0.3
         kind = rig.options()
         vehicle = MavlinkVehicle(
             kind, SAFE[autopilot], is_real=True, clock=rig, transport=rig, observes=True, decided=False
@@ -172,7 +172,7 @@ def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(
     file = tmp_path / KEPT_IN
     file.write_text(KEPT)
     with ready("px4") as rig:
-        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = held  # type: ignore[attr-defined]
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = held
         with connected(rig, trial_parameters=tmp_path) as vehicle:
             assert vehicle.concern == ""
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == afterwards
@@ -183,11 +183,11 @@ def test_what_the_vehicle_does_not_tell_is_kept_until_it_does(tmp_path: Path) ->
     file = tmp_path / KEPT_IN
     file.write_text(KEPT)
     with ready("px4") as rig:
-        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = math.nan  # type: ignore[attr-defined]  # it tells none
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = math.nan  # it tells none
         with connected(rig, trial_parameters=tmp_path) as vehicle:
             assert "MIS_TAKEOFF_ALT could not be restored to 2.5" in vehicle.concern
             assert file.read_text() == KEPT
-            rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+            rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
             vehicle.release()
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
             assert not file.exists()
@@ -197,7 +197,7 @@ def test_what_was_set_on_another_vehicle_is_not_put_back_on_this_one(tmp_path: P
     file = tmp_path / KEPT_IN
     file.write_text(KEPT.replace("px4 1", "px4 2"))
     with ready("px4") as rig:
-        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         with connected(rig, trial_parameters=tmp_path):
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0
 
@@ -207,7 +207,7 @@ def test_vehicles_of_one_type_that_have_one_address_by_turns_are_kept_apart(tmp_
     file.write_text(KEPT)
     with ready("px4") as rig:
         autopilot = rig.drone.autopilot
-        autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         own, autopilot.uid = autopilot.uid, 7  # type: ignore[attr-defined]
         with connected(rig, trial_parameters=tmp_path):
             assert (autopilot.held("MIS_TAKEOFF_ALT"), file.read_text()) == (3.0, KEPT)
@@ -224,7 +224,7 @@ def test_what_a_killed_process_had_set_is_put_back_under_another_address_where_t
     file = tmp_path / KEPT_IN
     file.write_text(KEPT)
     with ready("px4") as rig:
-        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         with connected(
             rig, trial_parameters=tmp_path, address="udp:127.0.0.1:14580@14550", simulated=simulated
         ) as vehicle:
@@ -237,7 +237,7 @@ def test_what_a_killed_process_had_set_is_put_back_before_anybody_has_decided_ab
     file = tmp_path / KEPT_IN
     file.write_text(KEPT)
     with ready("px4") as rig:
-        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         first = partial(MavlinkVehicle, rig.options(), SAFE["px4"], is_real=False, observes=True, decided=False)
         with closing(first(clock=rig, transport=rig, trial_parameters=tmp_path)) as vehicle:
             assert (vehicle.concern, rig.drone.autopilot.held("MIS_TAKEOFF_ALT")) == ("", 2.5)

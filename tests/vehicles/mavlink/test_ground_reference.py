@@ -69,9 +69,9 @@ def test_a_plan_that_another_station_hurries_sets_the_reference_again() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         enter(rig, HOLDING)
         vehicle.attend(0.3)
-        assert autopilot_of(rig)._origin_mm == PLAN_MM
+        assert autopilot_of(rig).origin_mm == PLAN_MM
         assert reference(vehicle).passed
-        assert (blocks_told(rig), autopilot_of(rig)._origin_mm) == ([WAIT_GPS], PLACE_MM)
+        assert (blocks_told(rig), autopilot_of(rig).origin_mm) == ([WAIT_GPS], PLACE_MM)
 
 
 @pytest.mark.complete
@@ -95,7 +95,7 @@ def test_a_restarted_vehicle_sets_it_again() -> None:
         assert not vehicle._radio.seen.has_ground_reference
         enter(rig, LANDED)
         assert reference(vehicle).passed
-        assert (blocks_told(rig), autopilot_of(rig)._origin_mm) == ([WAIT_GPS], PLACE_MM)
+        assert (blocks_told(rig), autopilot_of(rig).origin_mm) == ([WAIT_GPS], PLACE_MM)
 
 
 @pytest.mark.complete
@@ -103,9 +103,9 @@ def test_a_vehicle_that_stands_elsewhere_sets_it_again() -> None:
     """Switched on in the hand, say, and put down."""
     with LockstepRig() as rig, connected(rig) as vehicle:
         assert reference(vehicle).passed
-        autopilot_of(rig)._origin_mm += 500
+        autopilot_of(rig).origin_mm += 500
         assert reference(vehicle).passed
-        assert (blocks_told(rig), autopilot_of(rig)._origin_mm) == ([WAIT_GPS], PLACE_MM)
+        assert (blocks_told(rig), autopilot_of(rig).origin_mm) == ([WAIT_GPS], PLACE_MM)
 
 
 def test_without_a_position_it_is_not_flown() -> None:
@@ -148,7 +148,7 @@ def test_after_a_reboot_in_the_air_and_its_landing_it_is_set_before_the_next_fli
             vehicle.stage(TUNED)
         vehicle.land("to be sure")
         vehicle.attend(20.0)
-        assert autopilot_of(rig)._origin_mm == PLAN_MM, "Land ended “Geo init”"
+        assert autopilot_of(rig).origin_mm == PLAN_MM, "Land ended “Geo init”"
         vehicle.release()
         assert reference(vehicle).passed
-        assert autopilot_of(rig)._origin_mm == PLACE_MM
+        assert autopilot_of(rig).origin_mm == PLACE_MM

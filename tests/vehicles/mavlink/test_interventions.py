@@ -13,28 +13,20 @@ from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import end_of, ending_of
 from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink.test_trial_machine import STAGES, fly_too_high
-from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
+from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver, with_autopilot
 
 TAKE_OFF, STANDBY, LAND_BLOCK = 4, 5, 14
 BLOCKS = {2: "Holding point", 3: "Start Engine", TAKE_OFF: "Takeoff", STANDBY: "Standby", LAND_BLOCK: "land"}
-WITH_BLOCKS = replace(
-    PLAN,
-    limits=replace(
-        LIMITS,
-        blocks=BLOCKS,
-        arming_blocks=frozenset({"Holding point", "Start Engine"}),
-        flying_blocks=frozenset({"Takeoff"}),
-        landing_blocks=frozenset({"land here", "land", "flare", "landed"}),
-    ),
+WITH_BLOCKS = with_autopilot(
+    replace(PLAN, blocks=BLOCKS),
+    arming_blocks=frozenset({"Holding point", "Start Engine"}),
+    flying_blocks=frozenset({"Takeoff"}),
+    landing_blocks=frozenset({"land here", "land", "flare", "landed"}),
 )
-COPTER = replace(
-    PLAN,
-    limits=replace(
-        LIMITS,
-        flying_modes=frozenset({"guided"}),
-        landing_modes=frozenset({"land"}),
-        automatic_modes=frozenset({"guided", "land"}),
-    ),
+COPTER = with_autopilot(
+    flying_modes=frozenset({"guided"}),
+    landing_modes=frozenset({"land"}),
+    automatic_modes=frozenset({"guided", "land"}),
 )
 
 
@@ -269,7 +261,7 @@ def test_the_mode_from_before_the_command_and_one_heartbeat_after_it_are_no_pilo
 
 def test_a_vehicle_that_stays_on_the_ground_in_its_mode_from_before_did_not_lift_off() -> None:
     """Seen: one that was deaf to its command, and arms in a mode of a pilot, was taken for flown by hand."""
-    walk = TrialDriver(mode="64", plan=replace(PLAN, lift_off_s=4.0)).arm().pass_s(4.1)
+    walk = TrialDriver(mode="64", plan=with_autopilot(lift_off_s=4.0)).arm().pass_s(4.1)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
 
 
@@ -277,7 +269,7 @@ def test_a_px4_that_stays_on_the_ground_in_hold_did_not_lift_off() -> None:
     walk = TrialDriver(mode="hold", plan=PX4).arm().pass_s(1.6)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
     assert not walk.trial.doubt
-    walk = TrialDriver(mode="hold", plan=replace(PX4, lift_off_s=8.0)).arm().pass_s(8.1)
+    walk = TrialDriver(mode="hold", plan=with_autopilot(PX4, lift_off_s=8.0)).arm().pass_s(8.1)
     assert (walk.state, walk.trial.failure, walk.trial.doubt) == (State.DISARM, Failure.NO_LIFT_OFF, "")
 
 
@@ -296,7 +288,7 @@ def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
 
 
 def test_a_pilot_who_took_a_vehicle_on_the_ground_and_brings_back_its_first_mode_has_it() -> None:
-    walk = TrialDriver(mode="64", plan=replace(PLAN, lift_off_s=8.0)).arm().pass_s(2.0)
+    walk = TrialDriver(mode="64", plan=with_autopilot(lift_off_s=8.0)).arm().pass_s(2.0)
     walk.mode = "4"
     walk.pass_s(1.1)
     heartbeat_of_a_pilot(walk).pass_s(1.1)
@@ -304,7 +296,7 @@ def test_a_pilot_who_took_a_vehicle_on_the_ground_and_brings_back_its_first_mode
 
 
 def test_a_pilot_who_takes_a_vehicle_on_the_ground_has_it() -> None:
-    walk = TrialDriver(plan=replace(PLAN, lift_off_s=4.0)).arm()
+    walk = TrialDriver(plan=with_autopilot(lift_off_s=4.0)).arm()
     walk.mode = "64"
     walk.pass_s(2.6)
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
@@ -320,14 +312,10 @@ def test_a_vehicle_whose_second_source_differs_before_the_command_gets_no_take_o
     assert walk.trial.why == "They were 1.00 m apart before the takeoff command."
 
 
-PX4 = replace(
-    PLAN,
-    limits=replace(
-        LIMITS,
-        flying_modes=frozenset({"take-off", "hold"}),
-        hovering_modes=frozenset({"hold"}),
-        automatic_modes=frozenset({"take-off", "hold"}),
-    ),
+PX4 = with_autopilot(
+    flying_modes=frozenset({"take-off", "hold"}),
+    hovering_modes=frozenset({"hold"}),
+    automatic_modes=frozenset({"take-off", "hold"}),
 )
 
 
@@ -336,7 +324,7 @@ def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_reco
     reached_m: float, failure: Failure | None
 ) -> None:
     """Seen: between two heartbeats an ArduCopter was set to Guided again at 0.19 m, where it hovered to the end."""
-    walk = TrialDriver(plan=replace(PLAN, climbs_from_ground=True)).arm()
+    walk = TrialDriver(plan=with_autopilot(climbs_from_ground=True)).arm()
     walk.climb_rate_m_s = 1.0
     walk.pass_s(reached_m)
     walk.climb_rate_m_s = 0.0

@@ -31,10 +31,10 @@ from app.vehicles.mavlink.link import (
     MAX_QUEUED_MESSAGES,
     UNATTENDED_AFTER_S,
     Link,
-    LinkError,
-    LossCounter,
 )
+from app.vehicles.mavlink.link_health import LossCounter
 from app.vehicles.mavlink.other_peers import GONE_AFTER_S, INTERVAL_S
+from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (

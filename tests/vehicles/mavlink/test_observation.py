@@ -1,25 +1,25 @@
 from app.autopilots.measurements import Battery, Heartbeat
 from app.vehicles.mavlink import observation as watching
 from tests.vehicles.mavlink.monitors.observing import told, watch_of
-from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
+from tests.vehicles.mavlink.walking import PLAN
 
 
 def test_a_hover_keeps_every_limit() -> None:
     watch = told(watch_of(3.0, 3.0, 3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.05)
-    assert watch.envelope.find(LIMITS, watch.last, GROUND_M, settling=True) is None
-    assert watch.link.find(LIMITS, watch.modes.heartbeat_s, 10.1) is None
-    assert watching.find_frozen(watch, LIMITS, 10.3) is None
-    assert watching.find_lost_position(watch, LIMITS, 10.1) is None
+    assert watch.envelope.find(PLAN, watch.last, settling=True) is None
+    assert watch.link.find(PLAN, watch.modes.heartbeat_s, 10.1) is None
+    assert watching.find_frozen(watch, PLAN, 10.3) is None
+    assert watching.find_lost_position(watch, PLAN, 10.1) is None
     assert watch.battery.find(10.1) is None
-    assert watch.modes.find_unexpected(LIMITS, LIMITS.flying_modes, frozenset()) is None
+    assert watch.modes.find_unexpected(PLAN, PLAN.autopilot.flying_modes, frozenset()) is None
 
 
 def test_what_is_found_before_a_take_off_is_the_most_severe_of_several() -> None:
     """A second vehicle under its id explains a lost link, and not the other way round."""
     silent = watch_of(0.1)
-    lost = watching.find_on_ground(silent, LIMITS, 20.0)
+    lost = watching.find_on_ground(silent, PLAN, 20.0)
     assert lost is not None
     assert lost.failure == "F5"
-    duplicate = watching.find_on_ground(watching.note_duplicate(silent, "Two clocks."), LIMITS, 20.0)
+    duplicate = watching.find_on_ground(watching.note_duplicate(silent, "Two clocks."), PLAN, 20.0)
     assert duplicate is not None
     assert (duplicate.failure, duplicate.why) == ("F12", "Two clocks.")

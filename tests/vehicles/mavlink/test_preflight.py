@@ -20,13 +20,13 @@ STRANGE = (replace(HEARD[0], time_boot_s=3661.0), replace(HEARD[0], time_boot_s=
 def test_one_position_by_another_clock_is_not_where_its_record_begins(strange: Position, after: int) -> None:
     """All that it says itself would be taken for that of a vehicle which has rebooted."""
     positions = (*HEARD[: len(HEARD) - after], strange, *HEARD[len(HEARD) - after :])
-    last = GroundObservation(positions, 2.0).ground.last
+    last = GroundObservation(positions, 2.0).last
     assert last in HEARD
     assert last.time_boot_s > 61.9
 
 
 def test_a_single_position_is_the_last_one() -> None:
-    assert GroundObservation(HEARD[:1], 2.0).ground.last == HEARD[0]
+    assert GroundObservation(HEARD[:1], 2.0).last == HEARD[0]
 
 
 @pytest.mark.parametrize(("push_m_s2", "passed"), [(2.0, True), (2.5, False)])
@@ -65,7 +65,7 @@ def test_copies_that_arrive_late_are_not_the_last_position_on_the_ground() -> No
     copies = [replace(each, time_boot_s=each.time_boot_s - 3.0) for each in own]
     mixed = tuple(position for pair in zip(own, copies, strict=True) for position in pair)
     stray = (*mixed, Position(4000.0, 0.1, 0.0))
-    assert GroundObservation(stray, 2.0).ground.last == own[-1]
+    assert GroundObservation(stray, 2.0).last == own[-1]
 
 
 STEADY = [(160.0 + 0.02 * count, HEARD[count]) for count in range(100)]

@@ -24,20 +24,19 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     Tick,
 )
-from app.vehicles.mavlink.failures import Failure, Limits
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import advance, begin
-from app.vehicles.mavlink.trial_state import Plan, State, Trial
+from app.vehicles.mavlink.trial_state import State, Trial
 from tests.vehicles.mavlink.replaying import FLOWN, GROUND_STATION, LOGS, Recorded, messages, read, recorded
 
 PAPARAZZI = AUTOPILOTS["paparazzi"]
 TAKEOFFS = Path(__file__).parents[2] / "data" / "takeoffs"
 TAKEOFF = Takeoff()
-LIMITS = Limits(
-    set_point_m=3.0,
-    heartbeat_s=PAPARAZZI.heartbeat_s,
-    min_battery_v=10.5,
-    flying_modes=PAPARAZZI.flying_modes,
-    landing_modes=PAPARAZZI.landing_modes,
+SAFE_GAINS = tuple(Setting(name, 0.0) for name in ("gui_v_kp", "gui_v_kd", "gui_v_ki"))
+PLAN = Plan(
+    autopilot=replace(PAPARAZZI, landed_blocks=frozenset()),
+    safe_gains=SAFE_GAINS,
     blocks={
         2: "Holding point",
         3: "Start Engine",
@@ -47,11 +46,10 @@ LIMITS = Limits(
         15: "flare",
         16: "landed",
     },
-    arming_blocks=PAPARAZZI.arming_blocks,
-    flying_blocks=PAPARAZZI.flying_blocks,
-    landing_blocks=PAPARAZZI.landing_blocks,
+    ground_m=0.1,
+    set_point_m=3.0,
+    min_battery_v=10.5,
 )
-SAFE_GAINS = tuple(Setting(name, 0.0) for name in ("gui_v_kp", "gui_v_kd", "gui_v_ki"))
 
 
 class Replay:
@@ -65,7 +63,7 @@ class Replay:
         before = [each for each in messages(gains, "LOCAL_POSITION_NED", from_vehicle=True) if each.time_s < arming]
         positions = [heard for each in before if isinstance(heard := PAPARAZZI.measure(each.message), Position)]
         ground_m = float(np.median([position.altitude_m for position in positions]))
-        plan = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=ground_m, lift_off_s=PAPARAZZI.lift_off_s)
+        plan = replace(PLAN, ground_m=ground_m)
         self.told: list[tuple[float, Command]] = []
         self.states = [State.ARM]
         self.trial: Trial
@@ -187,9 +185,7 @@ def test_a_recorded_fall_whose_altitude_steps_is_a_fall_and_not_the_gains() -> N
     """Another station stopped the motors at 3.3 m: 8 steps of its altitude, up to 0.65 m, and -6.5 m/s at the ground.
     It was aborted for its climb rate of -4.1 m/s, and ready."""
     packets = heard("paparazzi_motors_stopped_in_the_air.tlog.gz", "paparazzi")
-    limits = replace(LIMITS, landed_blocks=PAPARAZZI.landed_blocks)
-    plan = Plan(safe_gains=SAFE_GAINS, limits=limits, ground_m=0.1, lift_off_s=PAPARAZZI.lift_off_s)
-    trial, actions = follow(plan, packets, 1.5)
+    trial, actions = follow(replace(PLAN, autopilot=PAPARAZZI), packets, 1.5)
     assert (trial.state, trial.failure, trial.contact) == (State.QUARANTINE, Failure.UNEXPECTED, "fell")
     assert not {Action.MOTORS_OFF, Action.KILL} & set(actions)
 
@@ -197,11 +193,8 @@ def test_a_recorded_fall_whose_altitude_steps_is_a_fall_and_not_the_gains() -> N
 def test_a_recorded_drift_on_the_ground_after_arming_is_no_takeoff_and_no_quarantine() -> None:
     """0.45 m in 3.6 s, while its landed state was on the ground: its motors were not stopped, because it was taken to
     be in the air."""
-    px4 = AUTOPILOTS["px4"]
     packets = heard("px4_ground_drift_after_arming.tlog.gz", "px4")
-    limits = replace(LIMITS, heartbeat_s=1.0, flying_modes=px4.flying_modes, landing_modes=px4.landing_modes, blocks={})
-    limits = replace(limits, arming_blocks=frozenset(), flying_blocks=frozenset(), landing_blocks=frozenset())
-    plan = Plan(safe_gains=SAFE_GAINS, limits=limits, ground_m=0.2, lift_off_s=px4.lift_off_s, climbs_from_ground=True)
+    plan = replace(PLAN, autopilot=AUTOPILOTS["px4"], ground_m=0.2, blocks={})
     trial, actions = follow(plan, [each for each in packets if each.now_s < 5.0], 1.1)
     assert (trial.state, trial.failure) == (State.DISARM, Failure.LOST_POSITION)
     assert (actions[0], set(actions[1:])) == (Action.ARM, {Action.MOTORS_OFF})

@@ -21,17 +21,15 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink import test_trial_machine as befall
-from tests.vehicles.mavlink.walking import PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
+from tests.vehicles.mavlink.walking import PLAN, SAFE_GAINS, STEP_S, TrialDriver, once, with_autopilot
 
 LATENCY_S = 0.06
 SET_POINTS = SetPoints((0.0, 6.0, 9.0, 12.0), (3.0, 2.0, 3.0, 2.0))
-LIMITS = replace(
-    PLAN.limits,
-    blocks={4: "Takeoff", 13: "land here"},
+STEPS = with_autopilot(
+    replace(PLAN, set_points=SET_POINTS, record_s=20.0, blocks={4: "Takeoff", 13: "land here"}),
     flying_blocks=frozenset({"Takeoff"}),
     landing_blocks=frozenset({"land here"}),
 )
-STEPS = replace(PLAN, set_points=SET_POINTS, limits=LIMITS, record_s=20.0)
 
 
 @dataclass
@@ -122,7 +120,7 @@ RARER = {"climb", "between steps", "after the last"}
 def test_each_set_point_is_commanded_by_the_vehicles_clock_and_becomes_that_of_all_limits() -> None:
     walk = hovering(14.5)
     assert walk.altitudes == [2.0, 3.0, 2.0]
-    assert walk.trial.plan.limits.set_point_m == 2.0
+    assert walk.trial.plan.set_point_m == 2.0
     due_s = [walk.when(Action.FLY_TO)[place] - walk.when(Action.TAKE_OFF)[0] for place in range(3)]
     assert due_s == pytest.approx([6.0, 9.0, 12.0], abs=0.03)
     took = walk.trial.set_points.changes
@@ -308,18 +306,14 @@ def test_the_takeoff_alone_has_no_further_set_points() -> None:
 
 
 OFFBOARD, LOITER = "6.0", "4.3"
-HOLDS_FIRST = replace(
-    STEPS,
-    set_points=SetPoints((0.0, 4.0, 9.0, 12.0), (3.0, 3.0, 2.0, 3.0)),
+HOLDS_FIRST = with_autopilot(
+    replace(PLAN, set_points=SetPoints((0.0, 4.0, 9.0, 12.0), (3.0, 3.0, 2.0, 3.0)), record_s=20.0),
     holds_first=True,
     following_modes=frozenset({OFFBOARD}),
-    limits=replace(
-        PLAN.limits,
-        flying_modes=frozenset({"4.2", LOITER}),
-        hovering_modes=frozenset({LOITER}),
-        landing_modes=frozenset({"4.6"}),
-        automatic_modes=frozenset({"0", "4.2", LOITER, OFFBOARD, "4.6"}),
-    ),
+    flying_modes=frozenset({"4.2", LOITER}),
+    hovering_modes=frozenset({LOITER}),
+    landing_modes=frozenset({"4.6"}),
+    automatic_modes=frozenset({"0", "4.2", LOITER, OFFBOARD, "4.6"}),
 )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from typing import ClassVar
 from unittest import mock
 
 import numpy as np
@@ -15,7 +16,7 @@ from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.simulated.body import OutgoingMessage
 from app.core.experiments.takeoff import Takeoff
 from app.simdrone import faults
-from app.simdrone.faults import Fault, FaultTarget
+from app.simdrone.fault_kinds import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Sample
 from tests.vehicles.flying import Watcher, never
 from tests.vehicles.mavlink.replaying import FLOWN, messages
@@ -74,7 +75,7 @@ def test_the_real_paparazzi_hovers_at_its_hover_throttle_and_reports_none_on_the
 Flown = tuple[FlightRecord, list[Sample], list[tuple[float, Message]]]
 
 
-def flown(autopilot: str, fault: type[Fault] | None = None) -> Flown:
+def flown(autopilot: str, fault: "type[Hostile] | None" = None) -> Flown:
     """The record of a trial with the safe gains, its live samples, and what was sent to the drone with its time."""
     return _flown(autopilot, "" if fault is None else fault.name)
 
@@ -137,6 +138,7 @@ def _requests(message: Message, kind: int) -> bool:
 class Hostile(Fault):
     """Changes the reports of throttle."""
 
+    name: ClassVar[str]
     drone: FaultTarget
 
     def begin(self, drone: FaultTarget) -> None:
@@ -213,7 +215,7 @@ def test_a_report_that_is_too_old_is_not_shown_and_not_recorded() -> None:
 @pytest.mark.complete
 @pytest.mark.parametrize("autopilot", FLOWN_ON)
 @pytest.mark.parametrize("fault", [WildThrottle, NoThrottle])
-def test_nothing_that_is_sent_and_nothing_else_recorded_depends_on_it(autopilot: str, fault: type[Fault]) -> None:
+def test_nothing_that_is_sent_and_nothing_else_recorded_depends_on_it(autopilot: str, fault: type[Hostile]) -> None:
     usual, _, sent = flown(autopilot)
     record, _, sent_too = flown(autopilot, fault)
     assert [(at_s, message.get_msgbuf()) for at_s, message in sent_too] == [

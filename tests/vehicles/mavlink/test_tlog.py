@@ -10,8 +10,9 @@ from pymavlink import mavutil
 
 from app.autopilots.dialects import ARDUPILOTMEGA, PAPARAZZI, Dialect, FieldValue, Message, number, text
 from app.core.clock import ScaledClock
-from app.vehicles.mavlink.link import Link, LinkError
+from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.tlog import TlogWriter, record
+from app.vehicles.mavlink.transports import LinkError
 from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, collect, heartbeat, position
 from tests.waiting import eventually
 

@@ -33,9 +33,10 @@ from app.vehicles.mavlink.events import (
     StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import begin
-from app.vehicles.mavlink.trial_state import Plan, State
-from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
+from app.vehicles.mavlink.trial_state import State
+from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver, once, with_autopilot
 
 ABORT = "the operator pressed Abort"
 
@@ -99,16 +100,12 @@ STAGES: dict[State, Callable[[], TrialDriver]] = {
 }
 
 
-COPTER = replace(PLAN, climbs_from_ground=True)
-REPORTS_LANDING = replace(
-    PLAN,
-    limits=replace(
-        PLAN.limits,
-        blocks={4: "Takeoff", 14: "land", 15: "landed"},
-        flying_blocks=frozenset({"Takeoff"}),
-        landing_blocks=frozenset({"land", "landed"}),
-        landed_blocks=frozenset({"landed"}),
-    ),
+COPTER = with_autopilot(climbs_from_ground=True)
+REPORTS_LANDING = with_autopilot(
+    replace(PLAN, blocks={4: "Takeoff", 14: "land", 15: "landed"}),
+    flying_blocks=frozenset({"Takeoff"}),
+    landing_blocks=frozenset({"land", "landed"}),
+    landed_blocks=frozenset({"landed"}),
     land_again_s=6.0,
 )
 
@@ -130,7 +127,7 @@ def test_the_ground_is_where_a_vehicle_stands_whose_altitude_began_anew_as_it_wa
     walk = begun_anew(by_m)
     assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + by_m)
     assert walk.trial.plan.datum_m == walk.trial.plan.ground_m
-    assert walk.trial.plan.limits.set_point_m == pytest.approx(PLAN.limits.set_point_m + by_m)
+    assert walk.trial.plan.set_point_m == pytest.approx(PLAN.set_point_m + by_m)
     assert walk.trial.watch.envelope.crossings == 0
     walk.pass_s(1.0)
     assert walk.trial.failure is None, "it is not taken for one in the air"
@@ -145,9 +142,9 @@ def test_the_ground_is_measured_again_before_the_command_for_starting_motors_shi
     """Seen: one that stood 0.2 m higher by its own altitude was taken for one in the air that hovers."""
     walk = begun_anew(by_m, plan=plan)
     assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + by_m)
-    datum_m = GROUND_M + by_m if plan.climbs_from_ground else 0.0
+    datum_m = GROUND_M + by_m if plan.autopilot.climbs_from_ground else 0.0
     assert walk.trial.plan.datum_m == pytest.approx(datum_m)
-    walk.pass_s(plan.lift_off_s + 0.1)
+    walk.pass_s(plan.autopilot.lift_off_s + 0.1)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
 
 
@@ -180,7 +177,7 @@ def test_a_vehicle_whose_altitude_rose_before_the_command_gets_no_take_off() -> 
 
 
 def test_a_vehicle_whose_altitude_began_anew_has_its_motors_stopped_where_it_stands() -> None:
-    walk = begun_anew(plan=replace(COPTER, lift_off_s=0.5))
+    walk = begun_anew(plan=with_autopilot(COPTER, lift_off_s=0.5))
     walk.pass_s(0.6)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
     walk.pass_s(1.1)
@@ -465,7 +462,7 @@ def test_a_lost_link_repeats_land_every_second_and_never_stops_the_motors() -> N
 
 def test_an_altitude_that_shifts_as_the_motors_start_is_no_lift_off_if_the_vehicle_says_that_it_stands() -> None:
     """Seen with a shift of 0.2 m for 1.5 s: it “descended to the ground by itself”, which blamed its gains."""
-    walk = TrialDriver(plan=replace(PLAN, lift_off_s=6.0)).arm()
+    walk = TrialDriver(plan=with_autopilot(lift_off_s=6.0)).arm()
     walk.altitude_m += 0.2
     walk.pass_s(1.5)
     walk.altitude_m -= 0.2
@@ -480,7 +477,7 @@ def test_an_altitude_that_shifts_as_the_motors_start_is_no_lift_off_if_the_vehic
 def test_a_vehicle_that_shows_the_ground_again_has_descended_if_it_flew_and_has_not_lifted_off_otherwise(
     rises_m: float, landed: bool, failure: str
 ) -> None:
-    walk = TrialDriver(plan=replace(PLAN, lift_off_s=4.0)).arm()
+    walk = TrialDriver(plan=with_autopilot(lift_off_s=4.0)).arm()
     walk.landed = landed
     for rate_m_s in (0.5, -0.5):
         walk.climb_rate_m_s = rate_m_s
@@ -891,7 +888,7 @@ def test_the_clock_may_begin_again_after_49_7_days() -> None:
 
 def test_a_mode_that_heartbeats_do_not_show_is_asked_for_and_two_replies_end_the_flight() -> None:
     mode = ModeParameter("aut_mod", 1600.0, {2.0: "home"})
-    walk = TrialDriver(plan=replace(PLAN, mode_parameter=mode)).lift_off().pass_s(1.0)
+    walk = TrialDriver(plan=with_autopilot(mode_parameter=mode)).lift_off().pass_s(1.0)
     asked = [at_s for at_s, command in walk.told if command == RequestGain("aut_mod")]
     assert len(asked) >= 3, "every second"
     walk.hear(Parameter("aut_mod", 2.0))

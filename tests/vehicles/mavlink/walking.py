@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import wraps
-from typing import ParamSpec, Self, TypeVar
+from typing import Any, ParamSpec, Self, TypeVar
 
 from app.autopilots.commands import Action, Setting
 from app.autopilots.measurements import (
@@ -17,6 +17,7 @@ from app.autopilots.measurements import (
     Parameter,
     Position,
 )
+from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
@@ -31,24 +32,44 @@ from app.vehicles.mavlink.events import (
     SendGain,
     Tick,
 )
-from app.vehicles.mavlink.failures import Limits
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import advance, begin
-from app.vehicles.mavlink.trial_state import Plan, State, Trial
+from app.vehicles.mavlink.trial_state import State, Trial
 
 GROUND_M = 0.1
 STEP_S = 0.02
 _NOISE_M = 1e-9
 """An estimate is never the same twice."""
 SAFE_GAINS = (Setting("gui_v_kp", 283.0), Setting("gui_v_kd", 82.0), Setting("gui_v_ki", 13.0))
-LIMITS = Limits(
-    set_point_m=3.0,
-    heartbeat_s=0.5,
-    min_battery_v=10.5,
+AUTOPILOT = replace(
+    AUTOPILOTS["paparazzi"],
+    land_again_s=1.0,
     flying_modes=frozenset({"4"}),
     landing_modes=frozenset({"4"}),
     automatic_modes=frozenset({"0", "4", "8"}),
+    mode_names={},
+    modes_without_land={},
+    mode_parameter=None,
+    arming_blocks=frozenset(),
+    flying_blocks=frozenset(),
+    landing_blocks=frozenset(),
+    landed_blocks=frozenset(),
+    stop_settings=(),
 )
-PLAN = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=GROUND_M, record_s=8.0)
+"""Without a flight plan, and without a mode that cannot be told from its heartbeats."""
+PLAN = Plan(
+    autopilot=AUTOPILOT,
+    safe_gains=SAFE_GAINS,
+    ground_m=GROUND_M,
+    set_point_m=3.0,
+    record_s=8.0,
+    min_battery_v=10.5,
+)
+
+
+def with_autopilot(plan: Plan = PLAN, **changes: Any) -> Plan:
+    """The plan under an autopilot that differs by these."""
+    return replace(plan, autopilot=replace(plan.autopilot, **changes))
 
 
 @dataclass

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.mavlink.failures import Failure, Finding, Limits
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 _LOW_S: Final = 1.0
@@ -18,9 +19,9 @@ class BatteryMonitor:
     voltage_v: float | None = None
     low_since_s: float | None = None
 
-    def update(self, voltage_v: float, now_s: float, limits: Limits) -> "BatteryMonitor":
+    def update(self, voltage_v: float, now_s: float, plan: Plan) -> "BatteryMonitor":
         since_s = self.low_since_s if self.low_since_s is not None else now_s
-        is_low = voltage_v < limits.min_battery_v
+        is_low = voltage_v < plan.min_battery_v
         return replace(self, heard_s=now_s, voltage_v=voltage_v, low_since_s=since_s if is_low else None)
 
     def find(self, now_s: float) -> Finding | None:

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding, Limits
+from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding
 from app.vehicles.mavlink.monitors.clock import FRESH_S
 from app.vehicles.mavlink.monitors.positions import RESTING_M_S
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 BEHIND_M: Final = 0.5
@@ -61,12 +62,12 @@ class ClimbMonitor:
     def has_been_near(self, altitude_m: float) -> bool:
         return self.highest_m >= altitude_m - _WITHIN_M
 
-    def find_interrupted(self, climb_to_m: float, mode: str, limits: Limits) -> Finding | None:
+    def find_interrupted(self, mode: str, plan: Plan) -> Finding | None:
         """Find a vehicle that hovers before it has been near its first set point: its failsafe or a person has stopped
         it."""
-        if mode not in limits.hovering_modes or self.has_been_near(climb_to_m):
+        if mode not in plan.autopilot.hovering_modes or self.has_been_near(plan.climb_to_m):
             return None
-        return Finding(Failure.UNEXPECTED, f"The vehicle entered mode {limits.named(mode)} before it had climbed.")
+        return Finding(Failure.UNEXPECTED, f"The vehicle entered mode {plan.named(mode)} before it had climbed.")
 
     def find_behind(self) -> Finding | None:
         """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""

@@ -13,7 +13,8 @@ from app.vehicles.mavlink.boot_clock import (
     OtherClock,
     may_have_begun,
 )
-from app.vehicles.mavlink.failures import Failure, Finding, Limits
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 FRESH_S: Final = 0.5
@@ -23,6 +24,8 @@ ATTENDED_S: Final = 0.1
 order."""
 _DRIFT: Final = 0.1
 """Share by which the vehicle's clock may be slower than ours."""
+STUCK_S: Final = 0.25
+LOST_S: Final = 0.5
 _LONGEST_STEP_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
 
@@ -88,21 +91,21 @@ class ClockMonitor:
             return position.time_boot_s - newest.time_boot_s - (now_s - self.advanced_s) - AHEAD_S
         return self.least_offset_s - (now_s - position.time_boot_s)
 
-    def find_frozen(self, limits: Limits, last: Position | None, accepted_s: float) -> Finding | None:
+    def find_frozen(self, plan: Plan, last: Position | None, accepted_s: float) -> Finding | None:
         """Find a clock that stands still or jumps; `last` is the last plausible position, of the time `accepted_s`."""
-        why, other = "", self.other
-        if self.stuck_s > limits.stuck_s and other is not None and other.advances and last is not None:
+        why, other, stuck_s = "", self.other, STUCK_S * plan.timeout_factor
+        if self.stuck_s > stuck_s and other is not None and other.advances and last is not None:
             gained_s = other.last.time_boot_s - last.time_boot_s
             why = f"Its clock jumped by {gained_s - (other.last_s - accepted_s):+.1f} s."
-        elif self.stuck_s > limits.stuck_s:
-            why = f"Its clock stood still for more than {limits.stuck_s:g} s."
+        elif self.stuck_s > stuck_s:
+            why = f"Its clock stood still for more than {stuck_s:g} s."
         elif self.stepped_s > _LONGEST_STEP_S:
             why = f"Its clock jumped ahead by {self.stepped_s:.1f} s."
         return Finding(Failure.FROZEN, why) if why else None
 
-    def find_late(self, limits: Limits) -> Finding | None:
+    def find_late(self, plan: Plan) -> Finding | None:
         """Find that positions arrive late, or that the clock is slower than it is said to be."""
-        if self.late_since_s is None or self.advanced_s - self.late_since_s <= limits.lost_s:
+        if self.late_since_s is None or self.advanced_s - self.late_since_s <= LOST_S * plan.timeout_factor:
             return None
         why = (
             f"Its positions arrive more than {FRESH_S:g} s late, or its clock is slower than the clock speed in its "

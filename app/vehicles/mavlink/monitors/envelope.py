@@ -5,9 +5,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.failures import Failure, Finding, Limits
+from app.vehicles.base import ALTITUDE_LIMIT_M
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
+_CLIMB_RATE_M_S: Final = 4.0
+_CROSSING_M: Final = 0.3
+_CROSSINGS: Final = 4
 _LEAN_RAD: Final = math.radians(20.0)
 _LEANING_OVER_S: Final = 1.5
 _LONGEST_LEAN_S: Final = 0.5
@@ -30,9 +35,9 @@ class EnvelopeMonitor:
     attitude_s: float | None = None
     breached: str = ""
 
-    def add_position(self, position: Position, limits: Limits) -> "EnvelopeMonitor":
-        above_m = position.altitude_m - limits.set_point_m
-        side = self.side if abs(above_m) <= limits.crossing_m else (1 if above_m > 0.0 else -1)
+    def add_position(self, position: Position, plan: Plan) -> "EnvelopeMonitor":
+        above_m = position.altitude_m - plan.set_point_m
+        side = self.side if abs(above_m) <= _CROSSING_M else (1 if above_m > 0.0 else -1)
         has_crossed = side != self.side
         if self.origin is not None and not has_crossed:
             return self
@@ -50,21 +55,21 @@ class EnvelopeMonitor:
         leaning = self.leaning + weight * ((abs(lean_rad) > _LEAN_RAD) - self.leaning)
         return replace(self, leaning=leaning, attitude_s=now_s)
 
-    def find(self, limits: Limits, last: Position | None, ground_m: float, *, settling: bool) -> Finding | None:
+    def find(self, plan: Plan, last: Position | None, *, settling: bool) -> Finding | None:
         """Find a limit that the vehicle has exceeded; crossings of the set point count while it is `settling` there."""
         why = ""
         if self.breached:
             why = f"The vehicle's own fence was crossed: {self.breached}."
         elif last is not None and self.origin is not None:
             away_m = last.away_m(self.origin)
-            if (height_m := last.altitude_m - ground_m) > limits.ceiling_m:
-                why = f"It was {height_m:.2f} m above the ground; the limit is {limits.ceiling_m:g} m."
-            elif abs(last.climb_rate_m_s) > limits.climb_rate_m_s:
-                why = f"Its climb rate was {last.climb_rate_m_s:+.1f} m/s; the limit is ±{limits.climb_rate_m_s:g} m/s."
-            elif away_m > limits.radius_m:
-                why = f"It was {away_m:.1f} m from its start; the limit is {limits.radius_m:g} m."
-            elif settling and self.crossings >= limits.crossings:
-                why = f"It crossed its set point {self.crossings} times by more than ±{limits.crossing_m:g} m."
+            if (height_m := last.altitude_m - plan.ground_m) > ALTITUDE_LIMIT_M:
+                why = f"It was {height_m:.2f} m above the ground; the limit is {ALTITUDE_LIMIT_M:g} m."
+            elif abs(last.climb_rate_m_s) > _CLIMB_RATE_M_S:
+                why = f"Its climb rate was {last.climb_rate_m_s:+.1f} m/s; the limit is ±{_CLIMB_RATE_M_S:g} m/s."
+            elif away_m > plan.radius_m:
+                why = f"It was {away_m:.1f} m from its start; the limit is {plan.radius_m:g} m."
+            elif settling and self.crossings >= _CROSSINGS:
+                why = f"It crossed its set point {self.crossings} times by more than ±{_CROSSING_M:g} m."
         return Finding(Failure.ENVELOPE, why) if why else self.find_oscillation()
 
     def find_oscillation(self) -> Finding | None:

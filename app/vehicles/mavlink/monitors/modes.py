@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.measurements import Heartbeat, Position
-from app.vehicles.mavlink.failures import Failure, Finding, Limits
+from app.vehicles.base import ALTITUDE_LIMIT_M
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 _IN_TURN: Final = 0.8
@@ -31,7 +33,7 @@ class ModeMonitor:
     block: str = ""
     block_s: float = 0.0
 
-    def update(self, heartbeat: Heartbeat, now_s: float, limits: Limits) -> "ModeMonitor":
+    def update(self, heartbeat: Heartbeat, now_s: float, plan: Plan) -> "ModeMonitor":
         armed_since_s = self.armed_since_s if heartbeat.armed == self.armed else now_s
         mode_since_s = self.mode_since_s if heartbeat.mode == self.mode else now_s
         return replace(
@@ -40,51 +42,49 @@ class ModeMonitor:
             heartbeat_gap_s=now_s - self.heartbeat_s,
             armed=heartbeat.armed,
             armed_since_s=armed_since_s,
-            is_disarmed=not heartbeat.armed and now_s - armed_since_s >= limits.confirmation_s,
+            is_disarmed=not heartbeat.armed and now_s - armed_since_s >= plan.confirmation_s,
             mode=heartbeat.mode,
             mode_since_s=mode_since_s,
-            agreed=heartbeat.mode if now_s - mode_since_s >= limits.confirmation_s else "",
+            agreed=heartbeat.mode if now_s - mode_since_s >= plan.confirmation_s else "",
         )
 
-    def find_taken_over(self, limits: Limits) -> Finding | None:
+    def find_taken_over(self, plan: Plan) -> Finding | None:
         """Find that a pilot flies the vehicle now."""
-        if not self.armed or not limits.is_manual(self.agreed):
+        if not self.armed or not plan.is_manual(self.agreed):
             return None
-        return Finding(Failure.TAKEN_OVER, f"The vehicle entered mode {limits.named(self.agreed)}.")
+        return Finding(Failure.TAKEN_OVER, f"The vehicle entered mode {plan.named(self.agreed)}.")
 
-    def find_interruption(self, before: "ModeMonitor", limits: Limits) -> Finding | None:
+    def find_interruption(self, before: "ModeMonitor", plan: Plan) -> Finding | None:
         """Find a manual mode that only the last heartbeat of the state `before` reported and the next one did not,
         unless it arrived between two heartbeats of the vehicle."""
-        was_by_hand = before.armed and limits.is_manual(before.mode)
-        is_in_turn = min(before.heartbeat_gap_s, self.heartbeat_gap_s) >= _IN_TURN * limits.heartbeat_s
-        if not (was_by_hand and is_in_turn) or limits.is_manual(self.mode):
+        was_by_hand = before.armed and plan.is_manual(before.mode)
+        is_in_turn = min(before.heartbeat_gap_s, self.heartbeat_gap_s) >= _IN_TURN * plan.heartbeat_s
+        if not (was_by_hand and is_in_turn) or plan.is_manual(self.mode):
             return None
-        return Finding(Failure.INTERRUPTED, f"One heartbeat reported mode {limits.named(before.mode)}.")
+        return Finding(Failure.INTERRUPTED, f"One heartbeat reported mode {plan.named(before.mode)}.")
 
     def find_disarming(self) -> Finding | None:
         return Finding(Failure.UNEXPECTED, "The vehicle disarmed itself in the air.") if self.is_disarmed else None
 
-    def find_unexpected(self, limits: Limits, modes: frozenset[str], blocks: frozenset[str]) -> Finding | None:
+    def find_unexpected(self, plan: Plan, modes: frozenset[str], blocks: frozenset[str]) -> Finding | None:
         """Find a mode or block other than the allowed `modes` and `blocks`, empty if any is."""
         why = ""
         if modes and self.agreed and self.agreed not in modes:
-            why = f"The vehicle entered mode {limits.named(self.agreed)}."
+            why = f"The vehicle entered mode {plan.named(self.agreed)}."
         elif blocks and self.block and self.block not in blocks:
             why = f"Its flight plan entered the block “{self.block}”."
         return Finding(Failure.UNEXPECTED, why) if why else None
 
-    def find_own_landing(
-        self, limits: Limits, last: Position | None, ground_m: float, *, mode_known: bool
-    ) -> Finding | None:
+    def find_own_landing(self, plan: Plan, last: Position | None, *, mode_known: bool) -> Finding | None:
         """Find a landing of a vehicle that should fly. `mode_known`: its mode is not the one before the command. Close
         below our ceiling, the vehicle's own ceiling is the cause, and the failure is that of the envelope."""
-        why = ""
-        if mode_known and self.agreed in limits.landing_modes and self.agreed not in limits.flying_modes:
-            why = f"It entered mode {limits.named(self.agreed)}."
-        elif self.block in limits.landing_blocks:
+        why, autopilot = "", plan.autopilot
+        if mode_known and self.agreed in autopilot.landing_modes - autopilot.flying_modes:
+            why = f"It entered mode {plan.named(self.agreed)}."
+        elif self.block in autopilot.landing_blocks:
             why = f"Its flight plan entered the block “{self.block}”."
         if not why or last is None:
             return None
-        if (height_m := last.altitude_m - ground_m) > limits.ceiling_m - _OWN_CEILING_M:
+        if (height_m := last.altitude_m - plan.ground_m) > ALTITUDE_LIMIT_M - _OWN_CEILING_M:
             return Finding(Failure.ENVELOPE, f"It was {height_m:.2f} m above the ground. {why}")
         return Finding(Failure.OWN_LANDING, why)

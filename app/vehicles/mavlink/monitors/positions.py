@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding, Limits
-from app.vehicles.mavlink.monitors.clock import FRESH_S
+from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding
+from app.vehicles.mavlink.monitors.clock import FRESH_S, LOST_S
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 RESTING_M_S: Final = 0.1
@@ -30,6 +31,7 @@ _DOUBT_DECAY_1_S: Final = 5.0
 """Tolerated doubted samples per second; with `_DOUBTED_LIMIT` more than that, the position is unreliable."""
 _UNCHANGED_S: Final = 1.0
 """In recordings of all three autopilots, no three consecutive estimates are equal in altitude and climb rate."""
+_IMPACT_M_S: Final = 2.0
 _IMPACT_BELOW_M: Final = 0.5
 
 
@@ -124,11 +126,12 @@ class PositionMonitor:
         why = f"Its altitude stood still for more than {_UNCHANGED_S:g} s while its clock ran."
         return Finding(Failure.FROZEN, why) if self.unchanged_s > _UNCHANGED_S else None
 
-    def find_implausible(self, limits: Limits, received_s: float, now_s: float) -> Finding | None:
+    def find_implausible(self, plan: Plan, received_s: float, now_s: float) -> Finding | None:
         """Find that none is plausible; to be called after a lost link was looked for, because silence is one."""
-        if min(now_s, received_s) - self.accepted_s <= limits.lost_s:
+        lost_s = LOST_S * plan.timeout_factor
+        if min(now_s, received_s) - self.accepted_s <= lost_s:
             return None
-        return Finding(Failure.LOST_POSITION, f"None of its positions was plausible for {limits.lost_s:g} s.")
+        return Finding(Failure.LOST_POSITION, f"None of its positions was plausible for {lost_s:g} s.")
 
     def find_unreliable(self) -> Finding | None:
         why = "Its position jumps back and forth."
@@ -160,13 +163,13 @@ class PositionMonitor:
             return None
         return Finding(Failure.LOST_POSITION, f"Its altitude has drifted: it was {off_m:+.1f} m on the ground.")
 
-    def find_fall(self, limits: Limits, ground_m: float) -> Finding | None:
+    def find_fall(self, ground_m: float) -> Finding | None:
         """Find ground contact at a speed above that of any landing."""
         last = self.last
         if last is None or self.doubted is not None:
             return None
         near = last.altitude_m - ground_m < _IMPACT_BELOW_M
-        if not near or last.climb_rate_m_s >= -limits.impact_m_s:
+        if not near or last.climb_rate_m_s >= -_IMPACT_M_S:
             return None
         return Finding(Failure.FALL, f"It hit the ground at {-last.climb_rate_m_s:.1f} m/s.")
 

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
-from app.vehicles.mavlink.failures import Failure, Finding, Limits
-from app.vehicles.mavlink.monitors.clock import ATTENDED_S
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.monitors.clock import ATTENDED_S, STUCK_S
+from app.vehicles.mavlink.monitors.link import SILENT_S
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 MAX_DIFFERENCE_M: Final = 0.3
@@ -46,13 +48,13 @@ class SecondSourceMonitor:
         is_old = self.received_s is None or now_s - self.received_s > _MAX_AGE_S
         return None if is_old or self.blind_s > 0.0 else self.altitude_m
 
-    def find_blind(self, limits: Limits, now_s: float) -> Finding | None:
+    def find_blind(self, plan: Plan, now_s: float) -> Finding | None:
         """Find a source whose samples have not been new for long, or that sends none."""
-        why = ""
-        if self.blind_s > limits.stuck_s:
-            why = f"The second source of altitude did not track it for more than {limits.stuck_s:g} s."
-        elif self.received_s is not None and now_s - self.received_s > limits.silent_s:
-            why = f"Nothing was received from the second source of altitude for {limits.silent_s:g} s."
+        why, stuck_s, silent_s = "", STUCK_S * plan.timeout_factor, SILENT_S * plan.timeout_factor
+        if self.blind_s > stuck_s:
+            why = f"The second source of altitude did not track it for more than {stuck_s:g} s."
+        elif self.received_s is not None and now_s - self.received_s > silent_s:
+            why = f"Nothing was received from the second source of altitude for {silent_s:g} s."
         return Finding(Failure.FROZEN, why) if why else None
 
     def find_disagreement(self) -> Finding | None:

@@ -5,6 +5,7 @@ from typing import Final
 
 from app.autopilots.measurements import Heartbeat, Measurement, Position, TargetAltitude
 from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace
 
 _SAME_M: Final = 0.05
@@ -43,20 +44,19 @@ class SetPointMonitor:
         return replace(self, changes=(*self.changes, change), is_changing=False)
 
     def update(
-        self, measurement: Measurement | None, now_s: float, wanted_m: float, following_modes: frozenset[str]
+        self, measurement: Measurement | None, now_s: float, plan: Plan
     ) -> tuple["SetPointMonitor", Finding | None]:
-        """Find a vehicle that follows another set point than the one it has confirmed, `wanted_m`, once a heartbeat
-        reports that it still follows set points: a pilot's mode changes its set point too. No `following_modes` if it
-        does not report them."""
+        """Find a vehicle that follows another set point than the one it has confirmed, once a heartbeat reports that it
+        still follows set points: a pilot's mode changes its set point too."""
         since_s = self.astray_since_s
         match measurement:
             case TargetAltitude(altitude_m=altitude_m):
-                is_known = following_modes and self.changes and not self.is_changing
-                is_astray = is_known and abs(altitude_m - wanted_m) > _SAME_M
+                is_known = self.changes and not self.is_changing
+                is_astray = is_known and abs(altitude_m - plan.set_point_m) > _SAME_M
                 astray_s = (since_s or now_s) if is_astray else None
                 return self if astray_s == since_s else replace(self, astray_since_s=astray_s), None
             case Heartbeat(mode=mode) if since_s is not None and now_s - since_s >= _ASTRAY_S:
                 why = "Its set point was changed by a command that was not Gainline's."
-                return self, Finding(Failure.INTERRUPTED, why) if mode in following_modes else None
+                return self, Finding(Failure.INTERRUPTED, why) if mode in plan.autopilot.following_modes else None
             case _:
                 return self, None

@@ -100,7 +100,7 @@ class Toy(Copter):
     )
     controller: ToyController
 
-    def __init__(self, body: Body, *, system: int) -> None:
+    def __init__(self, body: Body, system: int) -> None:
         super().__init__(body, ToyController(body), system=system)
 
     def tune(self) -> None:
@@ -128,4 +128,4 @@ class Toy(Copter):
         return 10.0
 
 
-KINDS: Final = (copter_kind("toy", "Toy", lambda body, system: Toy(body, system=system), {}),)
+KINDS: Final = (copter_kind("toy", "Toy", Toy, {}),)

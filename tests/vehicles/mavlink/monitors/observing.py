@@ -3,7 +3,7 @@
 from app.autopilots.measurements import Measurement, Position
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.observation import TrialObservation
-from tests.vehicles.mavlink.walking import LIMITS
+from tests.vehicles.mavlink.walking import PLAN
 
 START_S = 10.0
 
@@ -13,11 +13,11 @@ def watch_of(*altitudes_m: float, every_s: float = 0.02, climb_rate_m_s: float =
     watch = watching.begin(START_S)
     for number, altitude_m in enumerate(altitudes_m):
         at_s = START_S + number * every_s
-        watch, _ = watching.update(watch, Position(at_s, altitude_m, climb_rate_m_s), at_s, LIMITS)
+        watch, _ = watching.update(watch, Position(at_s, altitude_m, climb_rate_m_s), at_s, PLAN)
     return watch
 
 
 def told(watch: TrialObservation, *measurements: Measurement | None, at_s: float) -> TrialObservation:
     for measurement in measurements:
-        watch, _ = watching.update(watch, measurement, at_s, LIMITS)
+        watch, _ = watching.update(watch, measurement, at_s, PLAN)
     return watch

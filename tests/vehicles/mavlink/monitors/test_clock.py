@@ -3,7 +3,7 @@ from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import START_S, told, watch_of
-from tests.vehicles.mavlink.walking import LIMITS
+from tests.vehicles.mavlink.walking import PLAN
 
 
 def repeated(watch: TrialObservation, *, until_s: float) -> TrialObservation:
@@ -14,28 +14,28 @@ def repeated(watch: TrialObservation, *, until_s: float) -> TrialObservation:
 
 
 def test_a_clock_that_stands_still_among_packets_is_frozen() -> None:
-    assert watching.find_frozen(repeated(watch_of(3.0), until_s=10.24), LIMITS, 10.3) is None
-    frozen = watching.find_frozen(repeated(watch_of(3.0), until_s=10.28), LIMITS, 10.3)
+    assert watching.find_frozen(repeated(watch_of(3.0), until_s=10.24), PLAN, 10.3) is None
+    frozen = watching.find_frozen(repeated(watch_of(3.0), until_s=10.28), PLAN, 10.3)
     assert frozen is not None
     assert (frozen.failure, frozen.why) == (Failure.FROZEN, "Its clock stood still for more than 0.25 s.")
 
 
 def test_what_a_stall_delayed_may_come_in_any_order() -> None:
     watch = told(watch_of(3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.8)
-    assert watching.find_frozen(watch, LIMITS, 10.3) is None
+    assert watching.find_frozen(watch, PLAN, 10.3) is None
 
 
 def test_a_position_that_stays_away_among_other_packets_is_frozen_too() -> None:
     watch = watch_of(3.0)
     for beat in range(1, 4):
         watch = told(watch, Heartbeat(9, True, "4"), at_s=10.0 + beat * 0.5)
-    assert watching.find_frozen(watch, LIMITS, 10.3) is not None
+    assert watching.find_frozen(watch, PLAN, 10.3) is not None
 
 
 def test_silence_alone_is_not_frozen() -> None:
     watch = watch_of(3.0, 3.0)
-    watch, _ = watching.update(watch, Position(10.9, 3.0, 0.0), 10.9, LIMITS)
-    assert watching.find_frozen(watch, LIMITS, 10.3) is None
+    watch, _ = watching.update(watch, Position(10.9, 3.0, 0.0), 10.9, PLAN)
+    assert watching.find_frozen(watch, PLAN, 10.3) is None
 
 
 def test_a_packet_that_was_overtaken_is_left_out_and_a_clock_that_falls_back_is_a_reboot() -> None:

@@ -4,11 +4,11 @@ from app.autopilots.measurements import FenceBreach, Position
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import START_S, told, watch_of
-from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
+from tests.vehicles.mavlink.walking import PLAN
 
 
 def envelope(watch: TrialObservation, *, settling: bool = True) -> str | None:
-    finding = watch.envelope.find(LIMITS, watch.last, GROUND_M, settling=settling)
+    finding = watch.envelope.find(PLAN, watch.last, settling=settling)
     return None if finding is None else finding.why
 
 
@@ -28,7 +28,7 @@ def test_speed_is_limited_in_both_directions(climb_rate_m_s: float) -> None:
 
 def test_drifting_away_is_limited() -> None:
     watch = watching.begin(START_S, last=Position(9.98, 3.0, 0.0))
-    watch, _ = watching.update(watch, Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, LIMITS)
+    watch, _ = watching.update(watch, Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, PLAN)
     assert envelope(watch) == "It was 5.1 m from its start; the limit is 5 m."
 
 
@@ -51,11 +51,11 @@ def test_the_vehicles_own_fence_counts() -> None:
 def test_a_speed_beyond_reason_that_lasts_is_an_abort() -> None:
     watch = watch_of(3.0, 3.0)
     for at_s, altitude_m in ((10.04, 3.14), (10.06, 3.28)):
-        watch, _ = watching.update(watch, Position(at_s, altitude_m, 7.0), at_s, LIMITS)
+        watch, _ = watching.update(watch, Position(at_s, altitude_m, 7.0), at_s, PLAN)
     assert envelope(watch) == "Its climb rate was +7.0 m/s; the limit is ±4 m/s."
 
 
 def test_a_lone_speed_beyond_reason_is_no_abort() -> None:
     watch = watch_of(3.0, 3.0)
-    watch, kept = watching.update(watch, Position(10.04, 3.0, 7.0), 10.04, LIMITS)
+    watch, kept = watching.update(watch, Position(10.04, 3.0, 7.0), 10.04, PLAN)
     assert (kept, envelope(watch)) == ((), None)

@@ -1,10 +1,8 @@
-from dataclasses import replace
-
 from app.autopilots.measurements import Heartbeat
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import told, watch_of
-from tests.vehicles.mavlink.walking import LIMITS
+from tests.vehicles.mavlink.walking import PLAN, with_autopilot
 
 
 def beating(*beats: Heartbeat) -> TrialObservation:
@@ -24,11 +22,11 @@ def test_a_disarming_is_unexpected_once_heartbeats_agree() -> None:
 
 
 def test_a_strange_mode_is_unexpected_once_heartbeats_agree() -> None:
-    named = replace(LIMITS, mode_names={"0": "Failsafe"})
+    named = with_autopilot(mode_names={"0": "Failsafe"})
 
     def found(count: int) -> Finding | None:
         strange = [Heartbeat(9, True, "0")] * count
-        return beating(*strange).modes.find_unexpected(named, LIMITS.flying_modes, frozenset())
+        return beating(*strange).modes.find_unexpected(named, PLAN.autopilot.flying_modes, frozenset())
 
     assert (found(1), found(2)) == (None, None)
     strange = found(3)
@@ -37,7 +35,7 @@ def test_a_strange_mode_is_unexpected_once_heartbeats_agree() -> None:
 
 
 def test_a_mode_in_which_a_person_flies_is_a_take_over() -> None:
-    named = replace(LIMITS, mode_names={"64": "Manual"})
+    named = with_autopilot(mode_names={"64": "Manual"})
     taken = beating(*[Heartbeat(9, True, "64")] * 3).modes.find_taken_over(named)
     assert taken is not None
     assert (taken.failure, taken.why) == (Failure.TAKEN_OVER, "The vehicle entered mode Manual.")

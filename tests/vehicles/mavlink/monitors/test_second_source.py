@@ -2,7 +2,7 @@ import pytest
 
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.monitors.second_source import SecondSourceMonitor
-from tests.vehicles.mavlink.walking import LIMITS
+from tests.vehicles.mavlink.walking import PLAN
 
 
 def seen(*samples: tuple[float, float], vehicle_m: float = 3.0, is_new: bool = True) -> SecondSourceMonitor:
@@ -25,14 +25,14 @@ def test_two_sources_more_than_0_3_m_apart_for_0_3_s_disagree(
 
 def test_a_source_that_is_not_tracked_is_blind_after_a_quarter_of_a_second() -> None:
     lost = [(10.0 + 0.05 * count, 3.0) for count in range(7)]
-    assert seen(*lost[:6], is_new=False).find_blind(LIMITS, 10.3) is None
-    assert seen(*lost, is_new=False).find_blind(LIMITS, 10.3) is not None
+    assert seen(*lost[:6], is_new=False).find_blind(PLAN, 10.3) is None
+    assert seen(*lost, is_new=False).find_blind(PLAN, 10.3) is not None
     assert seen(*lost, is_new=False).altitude_at(10.3) is None
 
 
 def test_a_source_that_is_silent_is_blind_and_no_source_is_not() -> None:
-    assert seen((10.0, 3.0)).find_blind(LIMITS, 11.1) is not None
-    assert SecondSourceMonitor().find_blind(LIMITS, 11.1) is None
+    assert seen((10.0, 3.0)).find_blind(PLAN, 11.1) is not None
+    assert SecondSourceMonitor().find_blind(PLAN, 11.1) is None
     assert (seen((10.0, 3.0)).altitude_at(10.4), seen((10.0, 3.0)).altitude_at(10.6)) == (3.0, None)
 
 

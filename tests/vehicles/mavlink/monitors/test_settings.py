@@ -1,18 +1,21 @@
+from dataclasses import replace
+
 from app.autopilots.autopilot import ModeParameter
 from app.autopilots.commands import Setting
 from app.autopilots.measurements import Parameter
 from app.vehicles.mavlink.failures import Finding
 from app.vehicles.mavlink.monitors.settings import SettingMonitor
-from tests.vehicles.mavlink.walking import LIMITS
+from tests.vehicles.mavlink.walking import PLAN, with_autopilot
 
 GAINS = (Setting("gui_v_kp", 1600.0),)
 MODE = ModeParameter("aut_mod", 1600.0, {2.0: "home"})
+FLOWN = with_autopilot(replace(PLAN, trial_gains=GAINS), mode_parameter=MODE)
 
 
 def reported(*reports: Parameter) -> tuple[SettingMonitor, Finding | None]:
     settings, finding = SettingMonitor(), None
     for each in reports:
-        settings, finding = settings.update(each, GAINS, MODE, LIMITS)
+        settings, finding = settings.update(each, FLOWN)
     return settings, finding
 
 

@@ -1,0 +1,359 @@
+"""Kinds of faults of a simulated drone: each is one line in `FAULTS`, and a class if it remembers something."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from types import MappingProxyType
+from typing import Final, Protocol
+
+from app.autopilots.dialects import FieldValue
+from app.autopilots.simulated.body import TICK_S, Body, Fields, OutgoingMessage, SimulatedAutopilot
+from app.simdrone.motion_capture import MotionCapture
+
+_POSITION: Final = "LOCAL_POSITION_NED"
+_LOW_MV: Final = 9000
+_JUMP_M: Final = 1.0
+_JUMP_EVERY: Final = 25
+_TWICE_EVERY: Final = 5
+_SWAP_EVERY: Final = 4
+_WRONG_SYSTEM: Final = 77
+_WIND_M_S: Final = 2.0
+_LEAN_RAD: Final = math.radians(28.0 * math.sqrt(2.0))
+_LEAN_HZ: Final = 1.7
+_GROUND_DRIFT_M: Final = 0.45
+_GROUND_DRIFT_S: Final = 3.6
+
+
+class FaultTarget(Protocol):
+    """Parts of a drone that a fault can change."""
+
+    body: Body
+    autopilot: SimulatedAutopilot
+    cameras: MotionCapture
+
+    def reboot(self) -> None: ...
+
+
+class Fault:
+    """Base of all faults, without effect; faults override what they change."""
+
+    def begin(self, drone: FaultTarget) -> None:
+        """Begin the fault."""
+
+    def end(self, drone: FaultTarget) -> None:
+        """End the fault."""
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        """Return the changed messages of one tick."""
+        return list(messages)
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
+        """Return the changed packets of one tick."""
+        return list(frames)
+
+    @property
+    def receives_nothing(self) -> bool:
+        """Whether nothing is received."""
+        return False
+
+
+class MissingMessages(Fault):
+    """Messages of some kinds are not sent."""
+
+    def __init__(self, *kinds: str) -> None:
+        self._kinds = kinds
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [message for message in messages if message.kind not in self._kinds]
+
+
+class ChangedMessages(Fault, ABC):
+    """Messages of some kinds, by default positions, have other values."""
+
+    kinds: tuple[str, ...] = (_POSITION,)
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [
+            replace(message, fields={**message.fields, **self.change(message)})
+            if message.kind in self.kinds
+            else message
+            for message in messages
+        ]
+
+    @abstractmethod
+    def change(self, message: OutgoingMessage) -> Fields:
+        """Return the fields that differ."""
+
+
+@dataclass
+class Switched(Fault):
+    """Something is done to the drone at the beginning (`on`), and undone at the end."""
+
+    switch: Callable[[FaultTarget, bool], None]
+
+    def begin(self, drone: FaultTarget) -> None:
+        self.switch(drone, True)
+
+    def end(self, drone: FaultTarget) -> None:
+        self.switch(drone, False)
+
+
+def _take_over(drone: FaultTarget, on: bool) -> None:
+    """By a pilot, who holds the drone in place."""
+    (drone.autopilot.take_over if on else drone.autopilot.hand_back)()
+
+
+def _fly_home(drone: FaultTarget, on: bool) -> None:
+    """By itself: Paparazzi's HOME mode, the return mode of the others."""
+    (drone.autopilot.fly_home if on else drone.autopilot.hand_back)()
+
+
+def _ignore_parameters(drone: FaultTarget, on: bool) -> None:
+    drone.autopilot.ignores_parameters = on
+
+
+def _refuse_arming(drone: FaultTarget, on: bool) -> None:
+    drone.autopilot.refuses_arming = on
+
+
+def _stop_motors(drone: FaultTarget, on: bool) -> None:
+    drone.body.motors_dead = on
+
+
+def _carry_away(drone: FaultTarget, on: bool) -> None:
+    drone.body.wind_m_s = _WIND_M_S if on else 0.0
+
+
+def _blind(drone: FaultTarget, on: bool) -> None:
+    drone.cameras.blind = on
+
+
+def _freeze(drone: FaultTarget, on: bool) -> None:
+    drone.cameras.stuck = on
+
+
+def _drift(drone: FaultTarget, on: bool) -> None:
+    drone.cameras.drifts = on
+
+
+class LinkLost(Fault):
+    """No packets pass in either direction; the autopilot continues to fly."""
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002 - none of them passes
+        return []
+
+    @property
+    def receives_nothing(self) -> bool:
+        return True
+
+
+class Deaf(Fault):
+    """The drone receives nothing; its own packets arrive."""
+
+    @property
+    def receives_nothing(self) -> bool:
+        return True
+
+
+@dataclass
+class FrozenPosition(ChangedMessages):
+    """Position messages repeat the last one, with its time; other packets are unchanged."""
+
+    kinds = (_POSITION, "GLOBAL_POSITION_INT")
+    _held: dict[str, Fields] = field(default_factory=dict)
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        return self._held.setdefault(message.kind, message.fields)
+
+
+@dataclass
+class JumpingPosition(ChangedMessages):
+    """Every 25th position is one metre too high."""
+
+    _count: int = 0
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        self._count += 1
+        return {"z": _value(message, "z") - _JUMP_M} if self._count % _JUMP_EVERY == 0 else {}
+
+
+@dataclass
+class StuckAltitude(ChangedMessages):
+    """The altitude stays as it was, with a climb rate of 0, while the clock of the position advances."""
+
+    _z_m: float | None = None
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        self._z_m = _value(message, "z") if self._z_m is None else self._z_m
+        return {"z": self._z_m, "vz": 0.0}
+
+
+@dataclass
+class DriftingAltitude(ChangedMessages):
+    """Altitude and climb rate drift down from the true ones by so much, until they show the ground."""
+
+    drift_m_s: float
+    _body: Body | None = None
+    _since_ms: float | None = None
+
+    def begin(self, drone: FaultTarget) -> None:
+        self._body = drone.body
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        boot_ms, height_m = _value(message, "time_boot_ms"), 0.0 if self._body is None else self._body.altitude_m
+        self._since_ms = boot_ms if self._since_ms is None else self._since_ms
+        sunk_m = self.drift_m_s * (boot_ms - self._since_ms) / 1000.0
+        if sunk_m > height_m:
+            return {"z": _value(message, "z") + height_m, "vz": 0.0}
+        return {"z": _value(message, "z") + sunk_m, "vz": _value(message, "vz") + self.drift_m_s}
+
+
+class LeanOscillation(ChangedMessages):
+    """The roll angle oscillates with a standard deviation of 28°; the flight is otherwise unchanged."""
+
+    kinds = ("ATTITUDE",)
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        angle_rad = 2.0 * math.pi * _LEAN_HZ * _value(message, "time_boot_ms") / 1000.0
+        return {
+            "roll": _LEAN_RAD * math.sin(angle_rad),
+            "rollspeed": 2.0 * math.pi * _LEAN_HZ * _LEAN_RAD * math.cos(angle_rad),
+        }
+
+
+class LowBattery(ChangedMessages):
+    """The battery voltage is reported as 9.0 V, and the remaining charge as 10 %."""
+
+    kinds = ("SYS_STATUS", "BATTERY_STATUS")
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        return _drained(message.fields)
+
+
+@dataclass
+class DuplicatedPackets(Fault):
+    """Every fifth packet arrives twice."""
+
+    _count: int = 0
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
+        repeated: list[bytes] = []
+        for frame in frames:
+            self._count += 1
+            repeated += [frame] * (2 if self._count % _TWICE_EVERY == 0 else 1)
+        return repeated
+
+
+@dataclass
+class ReorderedPackets(Fault):
+    """Every fourth packet arrives after the one that followed it."""
+
+    _count: int = 0
+    _late: list[bytes] = field(default_factory=list)
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
+        passed: list[bytes] = []
+        for frame in frames:
+            self._count += 1
+            if self._count % _SWAP_EVERY == 0:
+                self._late.append(frame)
+            else:
+                passed += [frame, *self._late]
+                self._late.clear()
+        return passed
+
+
+class WrongSystem(Fault):
+    """Every packet comes from system 77."""
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [replace(message, system=_WRONG_SYSTEM) for message in messages]
+
+
+@dataclass
+class GroundDrift(ChangedMessages):
+    """The altitude sent rises by 0.45 m within 3.6 s of arming while the drone stands, and sinks as fast afterwards."""
+
+    _drone: FaultTarget | None = None
+    _risen_s: float = 0.0
+    _error_m: float = 0.0
+    _rate_m_s: float = 0.0
+
+    def begin(self, drone: FaultTarget) -> None:
+        self._drone = drone
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        self._rate_m_s = self._drift_m_s()
+        self._error_m = max(self._error_m + self._rate_m_s * TICK_S, 0.0)
+        return super().transform_messages(messages)
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        rate_m_s = self._rate_m_s if self._error_m else 0.0
+        return {"z": _value(message, "z") - self._error_m, "vz": _value(message, "vz") - rate_m_s}
+
+    def _drift_m_s(self) -> float:
+        """Return the rate of the error: upwards for as long as it stands armed, at most `_GROUND_DRIFT_S`."""
+        drone, speed_m_s = self._drone, _GROUND_DRIFT_M / _GROUND_DRIFT_S
+        if drone is None or not drone.autopilot.armed:
+            self._risen_s = 0.0
+        elif drone.body.stands and self._risen_s < _GROUND_DRIFT_S:
+            self._risen_s += TICK_S
+            return speed_m_s
+        return -speed_m_s
+
+
+FAULTS: Final[Mapping[str, Callable[[], Fault]]] = MappingProxyType(
+    {
+        "no-heartbeat": partial(MissingMessages, "HEARTBEAT"),
+        "param-unconfirmed": partial(Switched, _ignore_parameters),
+        "arm-refused": partial(Switched, _refuse_arming),
+        "no-lift-off": partial(Switched, _stop_motors),
+        "link-lost": LinkLost,
+        "deaf": Deaf,
+        "ack-lost": partial(MissingMessages, "MISSION_ACK"),
+        "silent-witness": partial(MissingMessages, "SCRIPT_CURRENT", "EXTENDED_SYS_STATE"),
+        "taken-over": partial(Switched, _take_over),
+        "foreign-kill": partial(Switched, lambda drone, on: drone.autopilot.kill() if on else None),
+        "flies-home": partial(Switched, _fly_home),
+        "frozen-position": FrozenPosition,
+        "jumping-position": JumpingPosition,
+        "stuck-altitude": StuckAltitude,
+        "drifting-altitude": partial(DriftingAltitude, 0.5),
+        "creeping-altitude": partial(DriftingAltitude, 0.1),
+        "lean-oscillation": LeanOscillation,
+        "low-battery": LowBattery,
+        "reboot": partial(Switched, lambda drone, on: drone.reboot() if on else None),
+        "duplicated-packets": DuplicatedPackets,
+        "reordered-packets": ReorderedPackets,
+        "wrong-system": WrongSystem,
+        "carried-away": partial(Switched, _carry_away),
+        "mocap-lost": partial(Switched, _blind),
+        "mocap-frozen": partial(Switched, _freeze),
+        "mocap-drift": partial(Switched, _drift),
+        "ground-drift": GroundDrift,
+    }
+)
+"""What each does is in docs/sim-drone.md."""
+
+
+def _value(message: OutgoingMessage, field: str) -> float:
+    value = message.fields[field]
+    if not isinstance(value, int | float):
+        raise TypeError(f"{message.kind}.{field} is not a number")
+    return value
+
+
+def _drained(fields: Fields) -> Fields:
+    """Return the fields with low values for the battery."""
+    low: dict[str, FieldValue] = dict(fields)
+    if "voltage_battery" in low:
+        low["voltage_battery"] = _LOW_MV
+    voltages = low.get("voltages")
+    if isinstance(voltages, Sequence) and not isinstance(voltages, str | bytes):
+        low["voltages"] = [_LOW_MV, *voltages[1:]]
+    share = low.get("battery_remaining")
+    if isinstance(share, int) and share >= 0:
+        low["battery_remaining"] = 10
+    return low
