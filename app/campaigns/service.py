@@ -6,6 +6,7 @@ safe gains once flights have shown that they are better.
 
 import re
 from collections.abc import Collection
+from functools import partial
 from itertools import count
 from typing import Final
 
@@ -35,11 +36,12 @@ from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
-from app.common.schemas import LONGEST_NAME, OptionValue, Page, encode_cursor
+from app.common.schemas import LONGEST_NAME, OptionValue, Page
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.formatting import confidence_text, format_gains, named_flights
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
+from app.db.pages import page_of
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.fleet.registration import promote_gains
@@ -60,11 +62,8 @@ def list_campaigns(
     cursor: str | None,
 ) -> Page[CampaignSummary]:
     """One page of summaries. Raises InputError for a cursor of another list."""
-    found, total = repository.campaign_page(
-        session, search=search, states=states, vehicles=vehicles, sort=sort, cursor=cursor, limit=limit
-    )
-    following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
-    return Page(items=summaries(session, [row for row, _ in found[:limit]]), total=total, next_cursor=following)
+    wanted, order = repository.campaigns_wanted(search, states, vehicles), repository.ORDERS[sort]
+    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=partial(summaries, session))
 
 
 def get_row(session: Session, campaign_id: int) -> CampaignRow:

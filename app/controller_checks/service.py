@@ -1,18 +1,18 @@
 """Operations on controller checks: check a recording, read the result, delete it."""
 
-from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session, undefer
 
 from app.autopilots.loop_check import FigureName, LoopCheck, Result
 from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import NotFoundError, StorageError
-from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, uploaded_name
+from app.common.schemas import Gains, Page, Schema, uploaded_name
 from app.db.models import ControllerCheckRow
+from app.db.pages import Order, page_of
 from app.figures.base import Card, card_of
 from app.figures.panels import ControllerFigure
 from app.figures.theme import ThemeName
@@ -26,15 +26,6 @@ def get_one(session: Session, check_id: int) -> ControllerCheckRow:
     if row is None:
         raise NotFoundError("controller check", check_id)
     return row
-
-
-def page(session: Session, *, before_id: int | None, limit: int) -> tuple[Sequence[ControllerCheckRow], int]:
-    """The newest `limit` + 1 checks before that id, without their results, and the total count."""
-    wanted = select(ControllerCheckRow)
-    if before_id is not None:
-        wanted = wanted.where(ControllerCheckRow.id < before_id)
-    total = session.scalar(select(func.count()).select_from(ControllerCheckRow)) or 0
-    return session.scalars(wanted.order_by(ControllerCheckRow.id.desc()).limit(limit + 1)).all(), total
 
 
 class ControllerCheckSummary(Schema):
@@ -89,6 +80,7 @@ class ControllerCheck(ControllerCheckSummary):
 
 
 _UNNAMED: Final = "recording"
+_NEWEST_FIRST: Final = Order("-id", ControllerCheckRow.id.expression, descending=True)
 _RESULT: Final = TypeAdapter(Result)
 
 
@@ -132,11 +124,14 @@ def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
 
 def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[ControllerCheckSummary]:
     """Page of checks, newest first."""
-    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
-    rows, total = page(session, before_id=before, limit=limit)
-    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    found = [ControllerCheckSummary.model_validate(row, from_attributes=True) for row in rows[:limit]]
-    return Page(items=found, total=total, next_cursor=following)
+    return page_of(
+        session,
+        select(ControllerCheckRow),
+        _NEWEST_FIRST,
+        cursor=cursor,
+        limit=limit,
+        view=lambda rows: [ControllerCheckSummary.view_of(row) for row in rows],
+    )
 
 
 def get_check(session: Session, check_id: int) -> ControllerCheck:

@@ -6,6 +6,7 @@ Every gain set passes the gate before it becomes a trial; an operator may overru
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -22,7 +23,7 @@ from app.campaigns.trials.views import trial_view, trial_views
 from app.campaigns.variants import gains_of
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, InputError, Problem
-from app.common.schemas import Gate, Page, decode_cursor, encode_cursor
+from app.common.schemas import Gate, Page
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.errors import TrajectoryError
@@ -31,6 +32,7 @@ from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategy import Proposal
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.pages import Order, page_of
 from app.db.trajectories import pack
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -98,6 +100,7 @@ def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, ov
     return GateDecision(gains, proposals.gate_json(gate), reason)
 
 
+_BY_NUMBER: Final = Order("number", TrialRow.number.expression)
 KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repeat": "repeat", "baseline": "baseline"}
 
 
@@ -132,10 +135,8 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
 def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
     """List trials by number. Raises NotFoundError, or InputError for a cursor of another list."""
     campaign = campaigns.get_row(session, campaign_id)
-    after = 0 if cursor is None else decode_cursor("number", cursor, float)[1]
-    rows, total = repository.trial_page(session, campaign_id, after_number=after, limit=limit)
-    following = encode_cursor("number", (0, rows[limit - 1].number)) if len(rows) > limit else None
-    return Page(items=trial_views(session, campaign, rows[:limit]), total=total, next_cursor=following)
+    wanted, view = repository.trials_wanted(campaign_id), partial(trial_views, session, campaign)
+    return page_of(session, wanted, _BY_NUMBER, cursor=cursor, limit=limit, view=view)
 
 
 def get_trial(session: Session, trial_id: int) -> Trial:
