@@ -298,6 +298,7 @@ class TrialRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     flown_at: Mapped[datetime | None]
 
+    campaign: Mapped[CampaignRow] = relationship()
     trajectory: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[trajectory_id])
     predicted: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[predicted_id])
 
@@ -385,6 +386,7 @@ class FlightRow(Base, Reported):
     claimed_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
+    campaign: Mapped[CampaignRow] = relationship()
     trial: Mapped[TrialRow] = relationship()
     vehicle: Mapped[VehicleRow] = relationship()
 

@@ -112,7 +112,7 @@ def cancel_trial(session: Session, trial_id: int) -> Trial:
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, end=not_begun("the trial was cancelled"))
     set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
-    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+    return trial_view(session, row)
 
 
 def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
@@ -141,7 +141,7 @@ def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str |
 
 def get_trial(session: Session, trial_id: int) -> Trial:
     """Raises NotFoundError."""
-    return _seen(session, history.trial_row(session, trial_id))
+    return trial_view(session, history.trial_row(session, trial_id))
 
 
 Predict = Callable[[Session, CampaignRow, Gains], Proposal | None]
@@ -186,7 +186,7 @@ def create_trial(
         _keep_prediction(row, predict(session, campaign, gains))
     session.add(row)
     session.flush()
-    return trial_view(session, campaign, row)
+    return trial_view(session, row)
 
 
 def _keep_prediction(row: TrialRow, found: Proposal | None) -> None:
@@ -222,11 +222,7 @@ def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     check_version(edit.version, row.version, f"Flight {row.number}", {"note": (row.note, edit.note)})
     row.note = edit.note
     row.version += 1
-    return _seen(session, row)
-
-
-def _seen(session: Session, row: TrialRow) -> Trial:
-    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+    return trial_view(session, row)
 
 
 def _chosen(session: Session, campaign: CampaignRow, new: TrialPlan) -> tuple[GateDecision, ProposalRow | None]:

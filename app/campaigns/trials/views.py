@@ -98,9 +98,9 @@ def _key(gains: Gains) -> object:
     return tuple(sorted(gains.items()))
 
 
-def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
+def trial_view(session: Session, row: TrialRow) -> Trial:
     """View of one trial; the errors of earlier trials are loaded for its verdict."""
-    return trial_views(session, campaign, [row])[0]
+    return trial_views(session, row.campaign, [row])[0]
 
 
 def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
@@ -109,13 +109,13 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     flights = history.latest_flights(session, [row.id for row in rows])
     field = ReferenceFlights(history.valid_flights(session, campaign.id), experiment_of_campaign(campaign).scatter)
     rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
-    return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
+    return [_view(row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
-def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
+def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
     """View of a record, thinned to at most `points` samples such that the scored output keeps its peaks."""
     assert row.trajectory is not None
-    output = get_experiment(campaign.experiment).output
+    output = get_experiment(row.campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
     chosen = select_samples(trajectory.time_s, leading, points)
     return TrajectoryOut(
@@ -130,13 +130,7 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
     )
 
 
-def _view(
-    campaign: CampaignRow,
-    row: TrialRow,
-    field: ReferenceFlights,
-    flight: FlightRow | None,
-    rehearsed: bool,
-) -> Trial:
+def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
     predicted_error, interval = _prediction(row, field)
     return Trial.view_of(
         row,
@@ -145,16 +139,16 @@ def _view(
         inside_interval=_is_inside(interval, row),
         group=_group(row, field),
         comparisons=comparisons(row, field),
-        verdict=verdict(row, field, get_experiment(campaign.experiment).error_unit, _flown_before(row, field)),
+        verdict=verdict(row, field, get_experiment(row.campaign.experiment).error_unit, _flown_before(row, field)),
         glitches=row.glitches or [],
         record=_record(row),
-        may_be_valid=_may_be_valid(campaign, row),
+        may_be_valid=_may_be_valid(row),
         flight=_flight(flight),
         speed=flight.speed if flight else None,
         settings=row.settings or {},
         reason=reason_of(row),
         given_reason=row.reason,
-        actions=_actions(campaign, row, flight, rehearsed),
+        actions=_actions(row, flight, rehearsed),
     )
 
 
@@ -252,11 +246,11 @@ def _record(trial: TrialRow) -> RecordBrief | None:
     return RecordBrief.view_of(row, ending=trial.ending or "completed", channels=channels, units=_units(channels))
 
 
-def _may_be_valid(campaign: CampaignRow, row: TrialRow) -> bool:
+def _may_be_valid(row: TrialRow) -> bool:
     """Whether a person may mark the flight valid. Without its record, which is large: its last time is in the curve."""
     if row.state not in {TrialState.CAPTURED, TrialState.INVALID} or row.ending == "aborted" or not row.curve:
         return row.state == TrialState.VALID
-    return row.curve[-1][0] >= float(experiment_of_campaign(campaign).grid_s[-1]) - MAX_GAP_S
+    return row.curve[-1][0] >= float(experiment_of_campaign(row.campaign).grid_s[-1]) - MAX_GAP_S
 
 
 def _units(channels: Iterable[str]) -> dict[str, str]:
@@ -274,10 +268,10 @@ def _flight(row: FlightRow | None) -> FlightBrief | None:
     )
 
 
-def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
+def _actions(row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
     """Allowed actions: those of the state table, less what the vehicle cannot do, what an active flight rules out, and
     what a missing rehearsal of a real vehicle rules out."""
-    vehicle = campaign.vehicle
+    vehicle = row.campaign.vehicle
     under_way = flight is not None and flight.state in ACTIVE_FLIGHT_STATES
     impossible = set()
     if under_way or not fleet.can_fly(vehicle):
@@ -292,7 +286,7 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, reh
         impossible.add("take-off")
     if fleet.can_fly(vehicle) and row.state == TrialState.PLANNED:
         impossible.add("upload")
-    if campaign.state not in CAMPAIGN_ACTIONS["judge"]:
+    if row.campaign.state not in CAMPAIGN_ACTIONS["judge"]:
         impossible |= {"classify", "upload", "judge abort"}
     if row.abort_cause == "limit":
         impossible.add("judge abort")
