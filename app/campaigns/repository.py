@@ -56,7 +56,7 @@ def curves(session: Session, trial_ids: Collection[int]) -> Mapping[int, list[li
     return {identity: curve for identity, curve in session.execute(wanted) if curve}
 
 
-def trials_wanted(campaign_id: int) -> Select[tuple[TrialRow]]:
+def trials_wanted(campaign_id: int) -> Select[TrialRow]:
     """The campaign's trials with the descriptions of their records."""
     return (
         select(TrialRow)
@@ -133,9 +133,7 @@ def names_beginning(session: Session, beginning: str) -> set[str]:
     return set(session.scalars(select(CampaignRow.name).where(CampaignRow.name.startswith(beginning, autoescape=True))))
 
 
-def campaigns_wanted(
-    search: str, states: Collection[CampaignState], vehicles: Collection[str]
-) -> Select[tuple[CampaignRow]]:
+def campaigns_wanted(search: str, states: Collection[CampaignState], vehicles: Collection[str]) -> Select[CampaignRow]:
     """Campaigns whose name contains `search`, in those states, on vehicles of those kinds; of all if empty."""
     wanted: list[ColumnElement[bool]] = [
         *([CampaignRow.name.icontains(search, autoescape=True)] if search else []),

@@ -10,7 +10,6 @@ from app.autopilots.experiments import EXPERIMENTS
 from app.common.schemas import (
     Gains,
     Gate,
-    Interval,
     Name,
     Number,
     OptionValue,
@@ -31,9 +30,9 @@ from app.core.tuning.definition_checks import (
     MIN_CEILING_M,
     MIN_CONFIDENCE,
 )
-from app.core.tuning.proposals import AdviceKind
+from app.core.tuning.proposals import Advice, AdviceKind
 from app.core.tuning.strategies import recommended_strategy
-from app.core.tuning.strategy import Explanation, Kind
+from app.core.tuning.strategy import Explanation, Interval, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
 # The ranges of a definition are documented here and checked in app.core.tuning.definition_checks with everything else,
@@ -308,15 +307,6 @@ class StopVerdict(Schema):
     reason: str
     sentence: str
     threshold: Annotated[float | None, Field(description="error below which the next flight counts as better")]
-
-
-class Advice(Schema):
-    """The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
-    first flight, or its gains again."""
-
-    kind: AdviceKind
-    gains: Gains
-    why: str
 
 
 Variant = Literal["smaller step", "repeat", "baseline"]

@@ -11,7 +11,6 @@ from app.campaigns import history, repository
 from app.campaigns.proposals import PROPOSAL_JOB, is_stale
 from app.campaigns.rehearsals import is_rehearsal_satisfied, passed_rehearsals, rehearsal_of
 from app.campaigns.schemas import (
-    Advice,
     Campaign,
     CampaignSummary,
     FlightChoice,
@@ -29,11 +28,12 @@ from app.campaigns.schemas import (
 from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
 from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
-from app.common.schemas import Gate, Interval, Trouble
+from app.common.schemas import Gate, Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
 from app.core.definition import aborted_by_gains
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
+from app.core.tuning.proposals import Advice
 from app.core.tuning.strategy import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
@@ -41,6 +41,7 @@ from app.jobs import service as jobs
 
 SPARKS: Final = 7
 _EXPLANATION: Final = TypeAdapter(Explanation)
+_ADVICE: Final = TypeAdapter(Advice)
 
 _NEXT_ACTIONS: Final[Mapping[CampaignState, str]] = {
     CampaignState.DRAFT: "Wait for the first gains",
@@ -159,9 +160,9 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         stop=stop["stop"], reason=stop["reason"] or "", sentence=stop["why"], threshold=stop["threshold"]
     )
     advice = _advice(row, verdict)
-    interval = None if row.interval is None else Interval.model_validate(row.interval)
-    lower = None if interval is None else interval.lower
-    predicts = history.is_prediction_informative(lower, trials)
+    predicted_error, interval = history.told_prediction(
+        row.predicted_error, row.interval, corrected=history.is_corrected(trials)
+    )
     return Proposal(
         id=row.id,
         campaign_id=row.campaign_id,
@@ -174,8 +175,8 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
             for name, value in row.gains.items()
         },
         choices=_choices(campaign, row, trials, advice),
-        predicted_error=row.predicted_error if predicts else None,
-        interval=interval if predicts else None,
+        predicted_error=predicted_error,
+        interval=interval,
         explanation=_EXPLANATION.validate_python(row.explanation),
         gate=Gate.model_validate(row.gate),
         stop_verdict=verdict,
@@ -209,7 +210,7 @@ def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]
 def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
     """The advice as stored; for rows of releases without advice, the stop rule's verdict and the proposal."""
     if row.advice is not None:
-        return Advice.model_validate(row.advice)
+        return _ADVICE.validate_python(row.advice)
     return Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
 
 

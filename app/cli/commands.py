@@ -1,7 +1,7 @@
 """The `gainline` command. Each command imports what it needs when it runs, so that help comes at once."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class _Reporting(TyperGroup):
     """Commands whose errors, the program's own ones, are printed for a person, with exit code 1."""
 
-    def invoke(self, ctx: typer.Context) -> object:
+    def invoke(self, ctx: Any) -> Any:  # of a type that typer does not export
         try:
             return super().invoke(ctx)
         except GainlineError as error:

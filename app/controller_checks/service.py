@@ -7,7 +7,7 @@ from pydantic import Field, TypeAdapter
 from sqlalchemy import select
 from sqlalchemy.orm import Session, undefer
 
-from app.autopilots.loop_check import FigureName, LoopCheck, Result
+from app.autopilots.loop_check import FigureName, LoopCheck, Result, SignalResult
 from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import NotFoundError, StorageError
 from app.common.schemas import Gains, Page, Schema, uploaded_name
@@ -39,25 +39,6 @@ class ControllerCheckSummary(Schema):
     checked_at: datetime
 
 
-class CheckedSignal(Schema):
-    """One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`."""
-
-    name: str
-    title: str
-    largest_difference: float
-    difference_unit: str
-    tolerance: Annotated[
-        float, Field(description="the largest difference allowed, or the largest median if there is one, same unit")
-    ]
-    allowance: Annotated[str, Field(description="description of the tolerance")]
-    verdict: Literal["exact", "agrees", "differs"]
-    different: Annotated[int, Field(description="number of samples that differ by more than the tolerance")]
-    first_different_s: float | None
-    median_difference: Annotated[
-        float | None, Field(description="decides the verdict, if it is given; else the largest difference does")
-    ]
-
-
 class CheckFigure(Schema):
     """An available figure of the check."""
 
@@ -75,7 +56,7 @@ class ControllerCheck(ControllerCheckSummary):
     gains_from: str
     better_gains: Annotated[Gains | None, Field(description="other gains that reproduce more of the commands")]
     notes: list[str]
-    signals: list[CheckedSignal]
+    signals: list[SignalResult]
     figures: list[CheckFigure]
 
 

@@ -27,7 +27,7 @@ class Order:
 
 def page_of(
     session: Session,
-    wanted: Select[tuple[R]],
+    wanted: Select[R],
     order: Order,
     *,
     cursor: str | None,

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
 from app.common.errors import NotFoundError
-from app.common.logging import lines_of_job
+from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
@@ -46,20 +46,10 @@ class Job(Schema):
     actions: Annotated[list[str], Field(description="allowed actions: cancel, retry")]
 
 
-class JobLogLine(Schema):
-    """A line of the worker's log about a job. `exception` is a traceback, empty without one."""
-
-    at: datetime
-    level: str
-    message: str
-    details: dict[str, str]
-    exception: str
-
-
 class JobLog(Schema):
     """The last lines about a job, oldest first; `total` counts all that are kept."""
 
-    lines: list[JobLogLine]
+    lines: list[LogLine]
     total: int
 
 
@@ -223,7 +213,7 @@ def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> Job
     """Log lines of a job. Raises NotFoundError."""
     row = _one(session, job_id)
     lines, total = lines_of_job(data_dir, job_id, since=row.created_at, limit=limit)
-    return JobLog.model_validate({"lines": lines, "total": total}, from_attributes=True)
+    return JobLog(lines=lines, total=total)
 
 
 def cancel_job(session: Session, job_id: int) -> Job:

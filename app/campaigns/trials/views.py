@@ -16,7 +16,6 @@ from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.common.conflict_checks import allowed
-from app.common.schemas import Interval
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
@@ -25,7 +24,7 @@ from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
-from app.core.tuning.predictions import is_informative
+from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.end_texts import cause_text, end_text, is_worded, unstaged_text
@@ -154,11 +153,8 @@ def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehe
 
 def _prediction(row: TrialRow, field: ReferenceFlights) -> tuple[float | None, Interval | None]:
     """The predicted error and its interval; both None if they said nothing."""
-    interval = None if row.predicted_interval is None else Interval.model_validate(row.predicted_interval)
-    lower = None if interval is None else interval.lower
-    if not is_informative(lower, corrected=field.best_before(row.number) is not None):
-        return None, None
-    return row.predicted_error, interval
+    is_corrected = field.best_before(row.number) is not None
+    return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
 
 
 def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:

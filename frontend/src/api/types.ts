@@ -15,7 +15,7 @@ export type {
   FigureTable,
   FittedParameter,
   FlightChoice,
-  GainInfo,
+  Gain,
   GainsPrediction,
   Gate,
   GivenGains,

@@ -122,8 +122,7 @@ export type AddressInfo = {
 /**
  * Advice
  *
- * The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
- * first flight, or its gains again.
+ * What to do next, with which gains, and why. Kind `baseline` is the first flight, or a repeat with its gains.
  */
 export type Advice = {
     /**
@@ -577,15 +576,15 @@ export type Check = {
     /**
      * Gain
      */
-    gain?: string;
+    gain: string;
     /**
      * Case
      */
-    case?: string;
+    case: string;
     /**
      * Offer
      */
-    offer?: {
+    offer: {
         [key: string]: number | number;
     };
 };
@@ -604,62 +603,6 @@ export type CheckFigure = {
      * Title
      */
     title: string;
-};
-
-/**
- * CheckedSignal
- *
- * One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`.
- */
-export type CheckedSignal = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Title
-     */
-    title: string;
-    /**
-     * Largest Difference
-     */
-    largest_difference: number;
-    /**
-     * Difference Unit
-     */
-    difference_unit: string;
-    /**
-     * Tolerance
-     *
-     * the largest difference allowed, or the largest median if there is one, same unit
-     */
-    tolerance: number;
-    /**
-     * Allowance
-     *
-     * description of the tolerance
-     */
-    allowance: string;
-    /**
-     * Verdict
-     */
-    verdict: 'exact' | 'agrees' | 'differs';
-    /**
-     * Different
-     *
-     * number of samples that differ by more than the tolerance
-     */
-    different: number;
-    /**
-     * First Different S
-     */
-    first_different_s: number | null;
-    /**
-     * Median Difference
-     *
-     * decides the verdict, if it is given; else the largest difference does
-     */
-    median_difference: number | null;
 };
 
 /**
@@ -920,7 +863,7 @@ export type ControllerCheck = {
     /**
      * Signals
      */
-    signals: Array<CheckedSignal>;
+    signals: Array<SignalResult>;
     /**
      * Figures
      */
@@ -1265,7 +1208,7 @@ export type ExperimentInfo = {
     /**
      * Gains
      */
-    gains: Array<GainInfo>;
+    gains: Array<Gain>;
     /**
      * Options
      */
@@ -1288,47 +1231,47 @@ export type Explanation = {
     /**
      * Base Flight
      */
-    base_flight?: number | null;
+    base_flight: number | null;
     /**
      * Gradient
      */
-    gradient?: {
+    gradient: {
         [key: string]: number;
     };
     /**
      * Direction
      */
-    direction?: {
+    direction: {
         [key: string]: number;
     };
     /**
      * Ladder
      */
-    ladder?: Array<LadderStep>;
+    ladder: Array<LadderStep>;
     /**
      * Chosen Length
      */
-    chosen_length?: number | null;
+    chosen_length: number | null;
     /**
      * Clipped
      */
-    clipped?: Array<string>;
+    clipped: Array<string>;
     /**
      * Notes
      */
-    notes?: Array<string>;
+    notes: Array<string>;
     /**
      * Lesson
      */
-    lesson?: string;
+    lesson: string;
     /**
      * Fitted
      */
-    fitted?: Array<FittedParameter>;
+    fitted: Array<FittedParameter>;
     /**
      * Trust Fraction
      */
-    trust_fraction?: number | null;
+    trust_fraction: number | null;
 };
 
 /**
@@ -1831,29 +1774,11 @@ export type FurtherFlights = {
 };
 
 /**
- * GainChange
+ * Gain
  *
- * One gain now (of the best flight, else of the vehicle's safe gains) and next.
+ * One tunable gain, in the controller's own counts or units; `scale` is a step size with a significant effect.
  */
-export type GainChange = {
-    /**
-     * Now
-     */
-    now: number | number;
-    /**
-     * Next
-     */
-    next: number | number;
-    /**
-     * Delta
-     */
-    delta: number | number;
-};
-
-/**
- * GainInfo
- */
-export type GainInfo = {
+export type Gain = {
     /**
      * Name
      */
@@ -1886,6 +1811,26 @@ export type GainInfo = {
      * Integer
      */
     integer: boolean;
+};
+
+/**
+ * GainChange
+ *
+ * One gain now (of the best flight, else of the vehicle's safe gains) and next.
+ */
+export type GainChange = {
+    /**
+     * Now
+     */
+    now: number | number;
+    /**
+     * Next
+     */
+    next: number | number;
+    /**
+     * Delta
+     */
+    delta: number | number;
 };
 
 /**
@@ -2096,7 +2041,7 @@ export type GivenGains = {
 /**
  * Glitch
  *
- * A part of the record that cannot be real, between the last good sample before it and the first good one after.
+ * `start_s` is the time of the last good sample before the glitch, `end_s` of the first good one after it.
  */
 export type Glitch = {
     /**
@@ -2218,13 +2163,13 @@ export type Identity = {
      *
      * hardware id in hexadecimal digits; empty if it is not reported
      */
-    uid?: string;
+    uid: string;
 };
 
 /**
  * Interval
  *
- * Interval that contains an error with probability `confidence`.
+ * Predicted interval of the error, with probability `confidence`.
  */
 export type Interval = {
     /**
@@ -2322,41 +2267,11 @@ export type JobLog = {
     /**
      * Lines
      */
-    lines: Array<JobLogLine>;
+    lines: Array<LogLine>;
     /**
      * Total
      */
     total: number;
-};
-
-/**
- * JobLogLine
- *
- * A line of the worker's log about a job. `exception` is a traceback, empty without one.
- */
-export type JobLogLine = {
-    /**
-     * At
-     */
-    at: string;
-    /**
-     * Level
-     */
-    level: string;
-    /**
-     * Message
-     */
-    message: string;
-    /**
-     * Details
-     */
-    details: {
-        [key: string]: string;
-    };
-    /**
-     * Exception
-     */
-    exception: string;
 };
 
 /**
@@ -2398,7 +2313,7 @@ export type LadderStep = {
     /**
      * Clipped
      */
-    clipped?: Array<string>;
+    clipped: Array<string>;
 };
 
 /**
@@ -2566,6 +2481,36 @@ export type LogEvidence = {
     parameters: {
         [key: string]: number;
     };
+};
+
+/**
+ * LogLine
+ *
+ * One log line: `details` are its further fields as text, `exception` is a traceback, empty without one.
+ */
+export type LogLine = {
+    /**
+     * At
+     */
+    at: string;
+    /**
+     * Level
+     */
+    level: string;
+    /**
+     * Message
+     */
+    message: string;
+    /**
+     * Details
+     */
+    details: {
+        [key: string]: string;
+    };
+    /**
+     * Exception
+     */
+    exception: string;
 };
 
 /**
@@ -2763,11 +2708,11 @@ export type OptionInfo = {
      *
      * the title without the help for entering a value; empty if it has none
      */
-    label?: string;
+    label: string;
     /**
      * Unit
      */
-    unit?: string;
+    unit: string;
     /**
      * Default
      */
@@ -2775,21 +2720,21 @@ export type OptionInfo = {
     /**
      * Choices
      */
-    choices?: Array<boolean | number | number | string>;
+    choices: Array<boolean | number | number | string>;
     /**
      * Lower
      */
-    lower?: number | null;
+    lower: number | null;
     /**
      * Upper
      */
-    upper?: number | null;
+    upper: number | null;
     /**
      * Autopilots
      *
      * the autopilots that have this option; empty: all
      */
-    autopilots?: Array<string>;
+    autopilots: Array<string>;
 };
 
 /**
@@ -3455,6 +3400,56 @@ export type Run = {
      * the long version, if there is one
      */
     full?: boolean;
+};
+
+/**
+ * SignalResult
+ *
+ * Result of one signal: the largest difference between recording and replica in `difference_unit`, the tolerance,
+ * the number of samples that differ by more, and the time of the first of these, s. If the signal is judged by its
+ * median difference, that is given, and the tolerance is the median's.
+ */
+export type SignalResult = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Largest Difference
+     */
+    largest_difference: number;
+    /**
+     * Difference Unit
+     */
+    difference_unit: string;
+    /**
+     * Tolerance
+     */
+    tolerance: number;
+    /**
+     * Allowance
+     */
+    allowance: string;
+    /**
+     * Verdict
+     */
+    verdict: 'exact' | 'agrees' | 'differs';
+    /**
+     * Different
+     */
+    different: number;
+    /**
+     * First Different S
+     */
+    first_different_s: number | null;
+    /**
+     * Median Difference
+     */
+    median_difference: number | null;
 };
 
 /**
@@ -4451,7 +4446,7 @@ export type VehicleCheck = {
     /**
      * Hint
      */
-    hint?: string;
+    hint: string;
 };
 
 /**
