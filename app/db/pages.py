@@ -9,7 +9,7 @@ from sqlalchemy import ColumnElement, Select, String, func, literal, tuple_
 from sqlalchemy.orm import Session
 
 from app.common.schemas import Page, decode_cursor, encode_cursor, instant
-from app.db.models import Reported
+from app.db.base import Reported
 from app.db.types import UtcDateTime
 
 R = TypeVar("R", bound=Reported)

@@ -21,9 +21,9 @@ from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
-from app.db.models import CampaignRow, JobRow, JsonObject
+from app.db.models import CampaignRow, JobRow
 from app.db.pages import Order, page_of
-from app.db.types import utc_now
+from app.db.types import JsonObject, utc_now
 
 
 class Job(Schema):

@@ -31,9 +31,10 @@ from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategy import Proposal
-from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.db.pages import Order, page_of
 from app.db.trajectories import pack
+from app.db.types import JsonObject
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.vehicles.flight_end import not_begun
