@@ -9,7 +9,6 @@ from app.campaigns import figure_data, flight_predictions, landscapes, proposals
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
-    CampaignStatistics,
     CampaignSummary,
     Clone,
     ConsideredGains,
@@ -20,7 +19,7 @@ from app.campaigns.schemas import (
     Promotion,
     Sort,
 )
-from app.campaigns.statistics import campaign_statistics
+from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.wear import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import FigureCard, Page, figure_card

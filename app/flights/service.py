@@ -149,8 +149,7 @@ def request_flight(
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
     """How far the flight of a trial has come and what takes that back, for who asks. Raises NotFoundError."""
     row = history.trial_row(session, trial_id)
-    readiness = _readiness(session, row, context, report_of)
-    return TrialReadiness.model_validate(readiness, from_attributes=True)
+    return TrialReadiness.view_of(_readiness(session, row, context, report_of))
 
 
 def _readiness(session: Session, row: TrialRow, context: RequestContext, report_of: ReportOf) -> Readiness:
