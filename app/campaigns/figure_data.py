@@ -225,7 +225,7 @@ def _predicted_flight(
     trial = next((row for row in rows if is_asked(row)), None)
     if trial is not None:
         planned: TrialRow | ProposalRow = trial
-        at, stored, curve_id = trial.number, trial.predicted_interval, _curve_id(session, trial)
+        at, stored, curve_id = trial.number, trial.predicted_interval, _curve_id(trial)
     else:
         proposal = None if number is not None else repository.latest_proposal(session, campaign.id)
         if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
@@ -245,13 +245,12 @@ def _predicted_flight(
     )
 
 
-def _curve_id(session: Session, row: TrialRow) -> int | None:
+def _curve_id(row: TrialRow) -> int | None:
     """The stored curve with which a trial was planned: its proposal's, else its own. None where its record has shown
     that it was flown with other gains."""
-    proposal = None if row.proposal_id is None else session.get(ProposalRow, row.proposal_id)
-    if proposal is None:
+    if row.proposal is None:
         return row.predicted_id
-    return proposal.predicted_id if proposal.gains == row.gains else None
+    return row.proposal.predicted_id if row.proposal.gains == row.gains else None
 
 
 def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:
@@ -276,7 +275,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     glitches = _glitches(row)
     glitches_s = [glitch.low for glitch in glitches]
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
-    predicted, band = _predicted(session, _curve_id(session, row), experiment.output)
+    predicted, band = _predicted(session, _curve_id(row), experiment.output)
     predicts = _flight(row, corrected=history.is_corrected(trials, row.number)).predicted_error is not None
     return FlightRecordData(
         number=row.number,

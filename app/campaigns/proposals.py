@@ -152,10 +152,9 @@ def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
     """Cancel the unflown trials of stale proposals."""
     trials = history.trials_of(session, campaign.id)
-    waiting = [row for row in trials if row.state in UNFLOWN_TRIAL_STATES and row.proposal_id is not None]
-    proposals = repository.proposals_by_id(session, {row.proposal_id for row in waiting if row.proposal_id})
+    waiting = (row for row in trials if row.state in UNFLOWN_TRIAL_STATES)
     outdated = [
-        row for row in waiting if row.proposal_id and is_stale(session, campaign, proposals[row.proposal_id], trials)
+        row for row in waiting if row.proposal is not None and is_stale(session, campaign, row.proposal, trials)
     ]
     reason = "its proposal is outdated: the campaign's flights have changed"
     cancel_unflown(outdated, history.flight_under_way(session, campaign.id), reason)

@@ -12,7 +12,6 @@ from app.common.states import CampaignState, TrialState
 from app.db.models import (
     CampaignRow,
     FlightRow,
-    OptionsJson,
     ProposalRow,
     RehearsalRow,
     TrajectoryRow,
@@ -21,6 +20,7 @@ from app.db.models import (
     VehicleRow,
 )
 from app.db.pages import Order
+from app.db.types import OptionsJson
 
 BEST_ERROR: Final = (
     select(func.min(TrialRow.error))
@@ -165,11 +165,6 @@ def rehearsed_ids(session: Session, campaign_ids: Collection[int]) -> Mapping[in
     """The campaigns that these rehearse, by the id of the rehearsal."""
     wanted = select(RehearsalRow).where(RehearsalRow.rehearsal_id.in_(campaign_ids))
     return {row.rehearsal_id: row.campaign_id for row in session.scalars(wanted)}
-
-
-def proposals_by_id(session: Session, proposal_ids: Collection[int]) -> Mapping[int, ProposalRow]:
-    found = session.scalars(select(ProposalRow).where(ProposalRow.id.in_(proposal_ids)))
-    return {row.id: row for row in found}
 
 
 def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:

@@ -28,19 +28,17 @@ from app.campaigns.schemas import (
 from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
 from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
-from app.common.schemas import Gate, Trouble
+from app.common.schemas import Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
 from app.core.definition import aborted_by_gains
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
 from app.core.tuning.proposals import Advice
-from app.core.tuning.strategy import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs
 
 SPARKS: Final = 7
-_EXPLANATION: Final = TypeAdapter(Explanation)
 _ADVICE: Final = TypeAdapter(Advice)
 
 _NEXT_ACTIONS: Final[Mapping[CampaignState, str]] = {
@@ -163,13 +161,10 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
     predicted_error, interval = history.told_prediction(
         row.predicted_error, row.interval, corrected=history.is_corrected(trials)
     )
-    return Proposal(
-        id=row.id,
-        campaign_id=row.campaign_id,
-        kind=row.kind,
+    return Proposal.view_of(
+        row,
         recommended=advice.kind,
         advice=advice,
-        gains=row.gains,
         changes={
             name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
             for name, value in row.gains.items()
@@ -177,12 +172,8 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         choices=_choices(campaign, row, trials, advice),
         predicted_error=predicted_error,
         interval=interval,
-        explanation=_EXPLANATION.validate_python(row.explanation),
-        gate=Gate.model_validate(row.gate),
         stop_verdict=verdict,
-        history_digest=row.history_digest,
         stale=is_stale(session, campaign, row, trials),
-        computed_at=row.computed_at,
     )
 
 

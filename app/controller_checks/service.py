@@ -159,19 +159,11 @@ def _check(result: Result) -> LoopCheck:
 
 
 def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
-    return ControllerCheck.model_validate(
-        {
-            "id": row.id,
-            "file_name": row.file_name,
-            "checked_at": row.checked_at,
-            **{name: getattr(result, name) for name in _FROM_RESULT},
-            "autopilot": AUTOPILOTS[result.autopilot].title,
-            "figures": [{"name": name, "title": title} for name, (title, _) in _check(result).figures.items()],
-        },
-        from_attributes=True,
+    return ControllerCheck.view_of(
+        result,
+        id=row.id,
+        file_name=row.file_name,
+        checked_at=row.checked_at,
+        autopilot=AUTOPILOTS[result.autopilot].title,
+        figures=[CheckFigure(name=name, title=title) for name, (title, _) in _check(result).figures.items()],
     )
-
-
-_FROM_RESULT: Final = (
-    "kind", "passed", "sentence", "rows", "gains", "gains_from", "better_gains", "notes", "signals",
-)  # fmt: skip

@@ -225,6 +225,7 @@ class TrialRow(Base, Reported):
     flown_at: Mapped[datetime | None]
 
     campaign: Mapped[CampaignRow] = relationship()
+    proposal: Mapped["ProposalRow | None"] = relationship()
     trajectory: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[trajectory_id])
     predicted: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[predicted_id])
 

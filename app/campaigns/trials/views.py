@@ -36,7 +36,8 @@ CONFIDENCE: Final = 0.9
 class ReferenceFlights:
     """The valid flights that a campaign's trials are compared with, indexed for constant or logarithmic lookup.
 
-    `valid` are the flights in their order, `prior` is the experiment's scatter.
+    `valid` are the flights in their order, `prior` is the experiment's scatter. `by_number` and `by_gains` hold all
+    flights with the gains of one.
     """
 
     def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
@@ -44,8 +45,8 @@ class ReferenceFlights:
         scored = [(flight.error, flight.number) for flight in valid if flight.error is not None]
         self._numbers = [number for _, number in scored]
         self._best_so_far = list(accumulate(scored, min))
-        self._by_number: Mapping[int, Group] = {number: group for group in groups for number in group.numbers}
-        self._by_gains: Mapping[object, Group] = {_key(group.gains): group for group in groups}
+        self.by_number: Final[Mapping[int, Group]] = {number: group for group in groups for number in group.numbers}
+        self.by_gains: Final[Mapping[object, Group]] = {_key(group.gains): group for group in groups}
         self.scatter: Final[PooledScatter | None] = pool_scatter(groups, prior) if groups else None
 
     def best_before(self, number: int) -> tuple[float, int] | None:
@@ -57,26 +58,18 @@ class ReferenceFlights:
         """Number of the first flight, if it is before the given one."""
         return self._numbers[0] if self._numbers and self._numbers[0] < number else None
 
-    def group_of(self, number: int) -> Group | None:
-        """All flights with the gains of the given flight."""
-        return self._by_number.get(number)
-
-    def group_with(self, gains: Gains) -> Group | None:
-        """All flights of the given gains."""
-        return self._by_gains.get(_key(gains))
-
 
 def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
     """Comparisons with the best flight before this one, then with the first; flights of the same gains are left out.
 
     Each side counts with all flights of its gains.
     """
-    own = field.group_of(row.number)
+    own = field.by_number.get(row.number)
     if own is None or field.scatter is None:
         return []
     found = []
     for against, number in _others(row, field):
-        other = field.group_of(number)
+        other = field.by_number.get(number)
         if other is None or other.gains == own.gains:
             continue
         comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
@@ -164,7 +157,7 @@ def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
 
 
 def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
-    same = field.group_with(row.gains)
+    same = field.by_gains.get(_key(row.gains))
     if same is None or field.scatter is None:
         return None
     return GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size)
@@ -172,7 +165,7 @@ def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
 
 def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
     """Numbers of the earlier flights with the gains of this trial."""
-    same = field.group_with(row.gains)
+    same = field.by_gains.get(_key(row.gains))
     return [] if same is None else [number for number in same.numbers if number < row.number]
 
 

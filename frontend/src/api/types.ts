@@ -9,6 +9,7 @@ export type {
   CampaignSummary,
   Catalogue,
   Check,
+  CheckItem,
   DefinitionOutput as Definition,
   Explanation,
   FigureCard,
@@ -36,7 +37,6 @@ export type {
   Trouble,
   Vehicle,
   VehicleAct,
-  VehicleCheck,
   VehicleKindInfo,
   VehicleState,
 } from "./generated";

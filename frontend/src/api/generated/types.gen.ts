@@ -606,6 +606,38 @@ export type CheckFigure = {
 };
 
 /**
+ * CheckItem
+ *
+ * Result of one preflight check: what was found, what is required, and what to do if they differ.
+ */
+export type CheckItem = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Passed
+     */
+    passed: boolean;
+    /**
+     * Found
+     */
+    found: string;
+    /**
+     * Needed
+     */
+    needed: string;
+    /**
+     * Hint
+     */
+    hint: string;
+};
+
+/**
  * Classification
  *
  * A person's review of a finished flight.
@@ -1129,7 +1161,7 @@ export type Estimate = {
     /**
      * Fitted
      */
-    fitted: Array<FittedNumber>;
+    fitted: Array<Fitted>;
 };
 
 /**
@@ -1371,11 +1403,11 @@ export type Finish = {
 };
 
 /**
- * FittedNumber
+ * Fitted
  *
- * A fitted parameter of the model with its standard error.
+ * A fitted parameter of the model with its standard error, in its unit.
  */
-export type FittedNumber = {
+export type Fitted = {
     /**
      * Name
      */
@@ -2141,7 +2173,8 @@ export type HoverSetting = {
 /**
  * Identity
  *
- * Identity that the vehicle reports over its link; pinned at the first connection without a concern.
+ * Identity of a vehicle: its MAVLink system id, its autopilot, the autopilot's version, and `uid`, the hardware id
+ * in hexadecimal digits. Version and `uid` are empty if the autopilot does not report them.
  */
 export type Identity = {
     /**
@@ -2154,14 +2187,10 @@ export type Identity = {
     autopilot: string;
     /**
      * Version
-     *
-     * empty if the autopilot does not report it
      */
     version: string;
     /**
      * Uid
-     *
-     * hardware id in hexadecimal digits; empty if it is not reported
      */
     uid: string;
 };
@@ -2549,6 +2578,26 @@ export type LoggedBehaviour = {
      * share of the rows with the throttle at a limit
      */
     saturated_share: number;
+};
+
+/**
+ * Loss
+ *
+ * Something that takes readiness back, what it means now, and the way on.
+ */
+export type Loss = {
+    /**
+     * Kind
+     */
+    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'checks failed' | 'quarantined' | 'control ended' | 'controlled by other';
+    /**
+     * What
+     */
+    what: string;
+    /**
+     * Way On
+     */
+    way_on: string;
 };
 
 /**
@@ -3037,26 +3086,6 @@ export type Proposal = {
      * Computed At
      */
     computed_at: string;
-};
-
-/**
- * ReadinessLoss
- *
- * A reason why readiness is lost: what it means now, and what to do.
- */
-export type ReadinessLoss = {
-    /**
-     * Kind
-     */
-    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'checks failed' | 'quarantined' | 'control ended' | 'controlled by other';
-    /**
-     * What
-     */
-    what: string;
-    /**
-     * Way On
-     */
-    way_on: string;
 };
 
 /**
@@ -4196,7 +4225,7 @@ export type TrialReadiness = {
      *
      * why; the takeoff is refused while there is any
      */
-    losses: Array<ReadinessLoss>;
+    losses: Array<Loss>;
     /**
      * Is Ready
      *
@@ -4319,7 +4348,7 @@ export type Vehicle = {
     /**
      * Checks
      */
-    checks: Array<VehicleCheck> | null;
+    checks: Array<CheckItem> | null;
     /**
      * Checked At
      */
@@ -4415,38 +4444,6 @@ export type VehicleCalibration = {
      */
     estimates: Array<Estimate>;
     retune: Retune;
-};
-
-/**
- * VehicleCheck
- *
- * One item of the preflight check.
- */
-export type VehicleCheck = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Title
-     */
-    title: string;
-    /**
-     * Passed
-     */
-    passed: boolean;
-    /**
-     * Found
-     */
-    found: string;
-    /**
-     * Needed
-     */
-    needed: string;
-    /**
-     * Hint
-     */
-    hint: string;
 };
 
 /**
@@ -7934,57 +7931,6 @@ export type BringInBundleResponses = {
 
 export type BringInBundleResponse = BringInBundleResponses[keyof BringInBundleResponses];
 
-export type GetLandscapeData = {
-    body?: never;
-    headers?: {
-        /**
-         * X-Gainline-Control
-         *
-         * token of the lease that gives control of the vehicle
-         */
-        'X-Gainline-Control'?: string | null;
-    };
-    path: {
-        /**
-         * Campaign Id
-         */
-        campaign_id: number;
-    };
-    query?: {
-        /**
-         * Theme
-         *
-         * colours for a light or a dark page
-         */
-        theme?: 'light' | 'dark';
-        /**
-         * Stacked
-         *
-         * one column of slices, for a narrow page
-         */
-        stacked?: boolean;
-    };
-    url: '/api/campaigns/{campaign_id}/figures/landscape';
-};
-
-export type GetLandscapeErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type GetLandscapeError = GetLandscapeErrors[keyof GetLandscapeErrors];
-
-export type GetLandscapeResponses = {
-    /**
-     * Successful Response
-     */
-    200: FigureCard;
-};
-
-export type GetLandscapeResponse = GetLandscapeResponses[keyof GetLandscapeResponses];
-
 export type GetCalibrationData = {
     body?: never;
     path: {
@@ -8055,6 +8001,57 @@ export type GetVehicleFigureResponses = {
 };
 
 export type GetVehicleFigureResponse = GetVehicleFigureResponses[keyof GetVehicleFigureResponses];
+
+export type GetLandscapeData = {
+    body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+        /**
+         * Stacked
+         *
+         * one column of slices, for a narrow page
+         */
+        stacked?: boolean;
+    };
+    url: '/api/campaigns/{campaign_id}/figures/landscape';
+};
+
+export type GetLandscapeErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetLandscapeError = GetLandscapeErrors[keyof GetLandscapeErrors];
+
+export type GetLandscapeResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetLandscapeResponse = GetLandscapeResponses[keyof GetLandscapeResponses];
 
 export type GetCampaignFigureData = {
     body?: never;
