@@ -21,8 +21,26 @@ GainlineError                 (app.core.errors)
 
 from app.core.errors import GainlineError, GainsError, InputError, Problem, TrajectoryError
 
-__all__ = ["GainlineError", "GainsError", "InputError", "Problem", "TrajectoryError"]
-"""Errors of the core that belong to the same tree."""
+__all__ = [
+    "AddressError",
+    "AlreadyRunningError",
+    "BusyError",
+    "ConflictError",
+    "GainlineError",
+    "GainsError",
+    "InputError",
+    "KeyReusedError",
+    "MediaTypeError",
+    "NotAllowedError",
+    "NotFoundError",
+    "Problem",
+    "SchemaError",
+    "StorageError",
+    "TooLargeError",
+    "TrajectoryError",
+    "UnavailableError",
+    "UnconfirmedError",
+]
 
 
 class UnconfirmedError(InputError):
