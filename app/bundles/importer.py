@@ -19,6 +19,7 @@ from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
 from app.common.errors import ConflictError, InputError, Problem
 from app.core.tuning.definition_checks import problems_of
+from app.db.base import added
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
@@ -47,9 +48,7 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
         updated_at=utc_now(),
         **_fields(source, _SET_HERE),
     )
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, row)
 
 
 def _definition(where: str, source: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
@@ -87,9 +86,7 @@ def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, source: P
     row = ProposalRow(
         campaign_id=campaign.id, predicted=_record(bundle, source.predicted), **_fields(source, {"predicted"})
     )
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, row)
 
 
 def _trials(

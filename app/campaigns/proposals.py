@@ -23,6 +23,7 @@ from app.core.policy import Gains
 from app.core.tuning.gate import GateResult
 from app.core.tuning.stop_rules import Reason, StopVerdict
 from app.db import trajectories
+from app.db.base import added
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.db.types import JsonObject, utc_now
 from app.jobs import service as jobs
@@ -93,8 +94,7 @@ def store_proposal(session: Session, campaign_id: int, computed: ProposalComputa
         advice=asdict(computed.advice),
         spread={**asdict(computed.spread), "flights": list(computed.flights)},
     )
-    session.add(row)
-    session.flush()
+    added(session, row)
     trials = history.trials_of(session, campaign_id)
     if not is_stale(session, campaign, row, trials) and history.find_unreviewed(trials) is None:
         _apply_to_campaign(session, campaign, computed.stop_verdict)

@@ -40,6 +40,7 @@ from app.common.schemas import LONGEST_NAME, OptionValue, Page
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.formatting import confidence_text, format_gains, named_flights
+from app.db.base import added
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.db.pages import page_of
 from app.fleet import service as fleet
@@ -142,8 +143,7 @@ def add_campaign(
         parent_id=parent_id,
         safe_gains=safe_gains,
     )
-    session.add(row)
-    session.flush()
+    added(session, row)
     request_proposal(session, row)
     return row
 
@@ -380,7 +380,6 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
         parent_id=row.id,
         safe_gains=dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains),
     )
-    session.add(RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
-    session.flush()
+    added(session, RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
     notify_rehearsed_campaign(session, made)
     return campaign_view(session, made)

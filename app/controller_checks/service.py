@@ -11,6 +11,7 @@ from app.autopilots.loop_check import FigureName, LoopCheck, Result, SignalResul
 from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import NotFoundError, StorageError
 from app.common.schemas import Gains, Page, Schema, uploaded_name
+from app.db.base import added
 from app.db.models import ControllerCheckRow
 from app.db.pages import Order, page_of
 from app.figures.base import Card, card_of
@@ -98,9 +99,7 @@ def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
         passed=result.passed,
         result=result.as_json(),
     )
-    session.add(row)
-    session.flush()
-    return _view(row, result)
+    return _view(added(session, row), result)
 
 
 def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[ControllerCheckSummary]:

@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal, TypeVar
 
 from sqlalchemy import JSON, CheckConstraint, Enum, MetaData
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
 from app.db.types import FlightEndJson, GainsJson, JsonObject, OptionsJson, UtcDateTime
 from app.vehicles.flight_end import FlightEnd
@@ -70,3 +70,13 @@ class Reported(Numbered):
     def reported_as(self) -> tuple[Topic, int, int | None]:
         """Topic, the row's id, and the campaign that it belongs to."""
         return self.topic, self.id, getattr(self, "campaign_id", None)
+
+
+R = TypeVar("R", bound=Base)
+
+
+def added(session: Session, row: R) -> R:
+    """Add a row to the database and return it, with its id and defaults."""
+    session.add(row)
+    session.flush()
+    return row

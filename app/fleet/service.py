@@ -15,6 +15,7 @@ from app.common.errors import BusyError, ConflictError, InputError, Problem
 from app.common.schemas import Page
 from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, VehicleState
 from app.core.policy import Gains
+from app.db.base import added
 from app.db.models import VehicleRow
 from app.db.pages import Order, page_of
 from app.db.types import utc_now
@@ -58,9 +59,7 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         safe_gains=dict(default_gains),
         state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
     )
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, row)
 
 
 def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, default_gains: Gains) -> VehicleRow:

@@ -26,6 +26,7 @@ from app.common.states import (
     TrialState,
 )
 from app.core.errors import GainlineError
+from app.db.base import added
 from app.db.models import FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
@@ -141,8 +142,7 @@ def request_flight(
         requested_at=now,
         take_off_at=now if mode == "fly" else None,
     )
-    session.add(flight)
-    session.flush()
+    added(session, flight)
     record_flight_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 

@@ -21,6 +21,7 @@ from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
+from app.db.base import added
 from app.db.models import CampaignRow, JobRow
 from app.db.pages import Order, page_of
 from app.db.types import JsonObject, utc_now
@@ -78,10 +79,7 @@ def enqueue_job(
         same = _newest(kind).where(JobRow.campaign_id == campaign_id, JobRow.state == JobState.QUEUED)
         if (waiting := session.scalar(same)) is not None:
             return waiting
-    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, order=order)
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, order=order))
 
 
 def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s: float) -> JobRow | None:

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.trials.schemas import TrialPhoto
 from app.common.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
+from app.db.base import added
 from app.db.models import TrialPhotoRow, TrialRow
 
 MAX_BYTES: Final = 10 * 2**20
@@ -57,10 +58,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
             f"Flight {trial.number} has {MAX_PER_TRIAL} photos, the maximum.",
             hint="Delete one of them, then add this one.",
         )
-    row = TrialPhotoRow(trial=trial, media_type=media_type, data=content)
-    session.add(row)
-    session.flush()
-    return TrialPhoto.view_of(row)
+    return TrialPhoto.view_of(added(session, TrialPhotoRow(trial=trial, media_type=media_type, data=content)))
 
 
 def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:

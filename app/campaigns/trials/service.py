@@ -31,6 +31,7 @@ from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategy import Proposal
+from app.db.base import added
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.db.pages import Order, page_of
 from app.db.trajectories import pack
@@ -185,9 +186,7 @@ def create_trial(
         row.predicted_error, row.predicted_interval = proposal.predicted_error, proposal.interval
     elif predict is not None:
         _keep_prediction(row, predict(session, campaign, gains))
-    session.add(row)
-    session.flush()
-    return trial_view(session, row)
+    return trial_view(session, added(session, row))
 
 
 def _keep_prediction(row: TrialRow, found: Proposal | None) -> None:
