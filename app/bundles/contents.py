@@ -21,6 +21,7 @@ from app.core.tuning.proposals import Advice
 from app.core.tuning.stop_rules import StopVerdict
 from app.core.tuning.strategy import Explanation, Interval
 from app.core.tuning.strategy import Kind as ProposalKind
+from app.db.types import JsonObject
 from app.vehicles.flight_end import FlightEnd
 
 FORMAT: Final = "gainline-campaign"
@@ -33,7 +34,6 @@ MAX_CAMPAIGNS: Final = 20
 
 _MAX_CHARACTERS: Final = 10_000
 
-JsonObject = dict[str, Any]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
 ShortText = Annotated[str, Field(max_length=200)]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
@@ -21,13 +21,12 @@ from app.common.errors import ConflictError, InputError, Problem
 from app.core.tuning.definition_checks import problems_of
 from app.db.base import added
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
-from app.db.types import utc_now
+from app.db.types import JsonObject, utc_now
 from app.fleet import service as fleet
 from app.fleet.registration import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.registry import VEHICLE_KINDS, check_options
 
-JsonObject = dict[str, Any]
 _SET_HERE: Final = {"id", "name", "definition", "safe_gains", "vehicle", "vehicle_options", "trials", "proposals"}
 """Fields of a campaign that are not stored as they came."""
 _AT_ONCE_BYTES: Final = 16 * 2**20

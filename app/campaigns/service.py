@@ -105,14 +105,13 @@ def get_campaign(session: Session, campaign_id: int) -> Campaign:
 
 def create_campaign(session: Session, new: NewCampaign) -> Campaign:
     """Create a draft and request its first proposal. Raises InputError that names every invalid field."""
-    row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
-    return campaign_view(session, row)
+    return campaign_view(session, add_campaign(session, new.name, new.definition, new.vehicle))
 
 
 def create_ready_campaign(session: Session, new: NewCampaign) -> int:
     """Create a campaign whose first flights have been flown already: it takes them without a proposal. Returns its id.
     Raises InputError that names every invalid field."""
-    row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
+    row = add_campaign(session, new.name, new.definition, new.vehicle)
     set_campaign_state(row, CampaignState.READY)
     return row.id
 
@@ -123,7 +122,7 @@ def add_campaign(
     asked: Definition,
     choice: VehicleChoice,
     *,
-    parent_id: int | None,
+    parent_id: int | None = None,
     safe_gains: dict[str, float] | None = None,
 ) -> CampaignRow:
     """Add a draft and request its first proposal.
@@ -165,8 +164,7 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     definition = _definition_for(origin, vehicle)
     if clone.warm_start:
         definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})
-    row = add_campaign(session, name, definition, vehicle, parent_id=origin.id)
-    return campaign_view(session, row)
+    return campaign_view(session, add_campaign(session, name, definition, vehicle, parent_id=origin.id))
 
 
 def _get_permitted(session: Session, campaign_id: int, context: RequestContext) -> CampaignRow:
