@@ -18,7 +18,7 @@ from app.accounts.keys_and_links import Keyring
 from app.bundles.router import router as bundles
 from app.campaigns import catalogue
 from app.campaigns.flight_predictions import PredictorCache
-from app.campaigns.router import figures_router, landscape_router, vehicles_router
+from app.campaigns.router import figures_router, vehicles_router
 from app.campaigns.router import router as campaigns
 from app.campaigns.trials.router import router as trials
 from app.campaigns.trials.router import uploads
@@ -96,7 +96,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         compare,
         reports,
         bundles,
-        landscape_router,
         vehicles_router,
         figures_router,
         events.router,

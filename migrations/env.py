@@ -6,7 +6,7 @@ from alembic import context
 from sqlalchemy import Connection, Enum
 
 from app.common.settings import Settings
-from app.db.models import Base
+from app.db.base import Base
 from app.db.session import open_engine
 from app.db.types import FlightEndJson, UtcDateTime
 

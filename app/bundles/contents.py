@@ -13,14 +13,15 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field, TypeAdapter, model_validator
 
 from app.campaigns.schemas import Definition
-from app.campaigns.trials.schemas import Glitch
-from app.common.schemas import Gate, Interval, Name, OptionValue, Schema
+from app.common.schemas import Gate, Name, OptionValue, Schema
 from app.common.states import AbortCause, CampaignState, Ending, Outcome, TrialKind, TrialState
 from app.core.experiments.base import ParameterDistribution
+from app.core.records.glitches import Glitch
 from app.core.tuning.proposals import Advice
 from app.core.tuning.stop_rules import StopVerdict
-from app.core.tuning.strategy import Explanation
+from app.core.tuning.strategy import Explanation, Interval
 from app.core.tuning.strategy import Kind as ProposalKind
+from app.db.types import JsonObject
 from app.vehicles.flight_end import FlightEnd
 
 FORMAT: Final = "gainline-campaign"
@@ -33,7 +34,6 @@ MAX_CAMPAIGNS: Final = 20
 
 _MAX_CHARACTERS: Final = 10_000
 
-JsonObject = dict[str, Any]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
 ShortText = Annotated[str, Field(max_length=200)]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
@@ -19,14 +19,14 @@ from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
 from app.common.errors import ConflictError, InputError, Problem
 from app.core.tuning.definition_checks import problems_of
+from app.db.base import added
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
-from app.db.types import utc_now
+from app.db.types import JsonObject, utc_now
 from app.fleet import service as fleet
 from app.fleet.registration import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.registry import VEHICLE_KINDS, check_options
 
-JsonObject = dict[str, Any]
 _SET_HERE: Final = {"id", "name", "definition", "safe_gains", "vehicle", "vehicle_options", "trials", "proposals"}
 """Fields of a campaign that are not stored as they came."""
 _AT_ONCE_BYTES: Final = 16 * 2**20
@@ -47,9 +47,7 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
         updated_at=utc_now(),
         **_fields(source, _SET_HERE),
     )
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, row)
 
 
 def _definition(where: str, source: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
@@ -87,9 +85,7 @@ def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, source: P
     row = ProposalRow(
         campaign_id=campaign.id, predicted=_record(bundle, source.predicted), **_fields(source, {"predicted"})
     )
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, row)
 
 
 def _trials(

@@ -13,6 +13,7 @@ from app.autopilots.registry import AUTOPILOTS
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema
+from app.core.policy import Gain
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
 from app.fleet.views import is_registered_one_by_one
@@ -35,17 +36,6 @@ class Health(Schema):
     version: str
     worker: Literal["running", "not answering", "absent"]
     vehicles_not_answering: list[VehicleTrouble]
-
-
-class GainInfo(Schema):
-    name: str
-    title: str
-    unit: str
-    lower: float
-    upper: float
-    scale: float
-    default: float
-    integer: bool
 
 
 class OptionInfo(Schema):
@@ -73,7 +63,7 @@ class ExperimentInfo(Schema):
     output_unit: str
     error_unit: str
     has_model: bool
-    gains: list[GainInfo]
+    gains: list[Gain]
     options: list[OptionInfo]
 
 

@@ -19,10 +19,9 @@ from app.core.experiments.base import Experiment, Scatter
 from app.core.records.flight_events import FlightEvent, flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
-from app.core.tuning.predictions import is_informative
-from app.core.tuning.strategy import band_channels
+from app.core.tuning.strategy import Interval, band_channels
 from app.db import trajectories
-from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats, curve_name
@@ -140,16 +139,15 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
 
 def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
     """A flight without its curve; `corrected`: whether a valid flight before it had corrected the model."""
-    interval = _interval(row.predicted_interval)
-    predicts = is_informative(None if interval is None else interval.low, corrected=corrected)
+    error, interval = history.told_prediction(row.predicted_error, row.predicted_interval, corrected=corrected)
     return FlightData(
         number=row.number,
         gains=row.gains,
         outcome="not yet reviewed" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
         curve=None,
         error=row.error,
-        predicted_error=row.predicted_error if predicts else None,
-        interval=interval if predicts else None,
+        predicted_error=error,
+        interval=_range(interval),
         glitches=_glitches(row),
     )
 
@@ -173,8 +171,8 @@ def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
     )
 
 
-def _interval(stored: JsonObject | None) -> Range | None:
-    return None if stored is None else Range(float(stored["lower"]), float(stored["upper"]))
+def _range(interval: Interval | None) -> Range | None:
+    return None if interval is None else Range(interval.lower, interval.upper)
 
 
 def _glitches(row: TrialRow) -> tuple[Range, ...]:
@@ -222,40 +220,37 @@ def _predicted_flight(
     session: Session, campaign: CampaignRow, rows: Sequence[TrialRow], output: str, number: int | None
 ) -> NextFlight | None:
     """The trial with that number; without one, the trial that is planned or flying, else the fresh proposal for the
-    trial after the last one. None if there is none."""
+    trial after the last one. None if there is none. Where the prediction says nothing, the model's curve stays."""
     is_asked = (lambda row: row.state in _UNFLOWN) if number is None else (lambda row: row.number == number)
     trial = next((row for row in rows if is_asked(row)), None)
     if trial is not None:
-        curve_id, interval = _curve_id(session, trial), _interval(trial.predicted_interval)
-        corrected = history.is_corrected(rows, trial.number)
-        return _next_flight(trial.number, trial, interval, _predicted(session, curve_id, output), corrected=corrected)
-    proposal = None if number is not None else repository.latest_proposal(session, campaign.id)
-    if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
-        return None
-    number, interval = max((row.number for row in rows), default=0) + 1, _interval(proposal.interval)
-    predicted = _predicted(session, proposal.predicted_id, output)
-    return _next_flight(number, proposal, interval, predicted, corrected=history.is_corrected(rows))
+        planned: TrialRow | ProposalRow = trial
+        at, stored, curve_id = trial.number, trial.predicted_interval, _curve_id(trial)
+    else:
+        proposal = None if number is not None else repository.latest_proposal(session, campaign.id)
+        if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
+            return None
+        at = max((row.number for row in rows), default=0) + 1
+        planned, stored, curve_id = proposal, proposal.interval, proposal.predicted_id
+    corrected = history.is_corrected(rows, at)
+    error, interval = history.told_prediction(planned.predicted_error, stored, corrected=corrected)
+    curve, band = _predicted(session, curve_id, output)
+    return NextFlight(
+        number=at,
+        gains=planned.gains,
+        curve=curve,
+        predicted_error=error,
+        band=None if error is None else band,
+        interval=_range(interval),
+    )
 
 
-def _next_flight(
-    number: int, planned: TrialRow | ProposalRow, interval: Range | None, predicted: _Predicted, *, corrected: bool
-) -> NextFlight:
-    """The flight without an error, interval and band that say nothing; the model's curve stays."""
-    curve, band = predicted
-    error, gains = planned.predicted_error, planned.gains
-    flight = NextFlight(number=number, gains=gains, curve=curve, predicted_error=error, band=band, interval=interval)
-    if is_informative(None if interval is None else interval.low, corrected=corrected):
-        return flight
-    return replace(flight, predicted_error=None, interval=None, band=None)
-
-
-def _curve_id(session: Session, row: TrialRow) -> int | None:
+def _curve_id(row: TrialRow) -> int | None:
     """The stored curve with which a trial was planned: its proposal's, else its own. None where its record has shown
     that it was flown with other gains."""
-    proposal = None if row.proposal_id is None else session.get(ProposalRow, row.proposal_id)
-    if proposal is None:
+    if row.proposal is None:
         return row.predicted_id
-    return proposal.predicted_id if proposal.gains == row.gains else None
+    return row.proposal.predicted_id if row.proposal.gains == row.gains else None
 
 
 def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:
@@ -280,7 +275,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     glitches = _glitches(row)
     glitches_s = [glitch.low for glitch in glitches]
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
-    predicted, band = _predicted(session, _curve_id(session, row), experiment.output)
+    predicted, band = _predicted(session, _curve_id(row), experiment.output)
     predicts = _flight(row, corrected=history.is_corrected(trials, row.number)).predicted_error is not None
     return FlightRecordData(
         number=row.number,

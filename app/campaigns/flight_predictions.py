@@ -14,13 +14,13 @@ from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.proposals import read_donor
 from app.campaigns.schemas import GainsPrediction, PredictedCurve
-from app.common.schemas import Interval
 from app.common.states import TrialState
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
+from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database
@@ -170,7 +170,7 @@ def _checked(question: _Question, predicted: Proposal | None) -> Proposal | None
     if predicted is None or predicted.predicted_error is None or not math.isfinite(predicted.predicted_error):
         return None
     lower = None if predicted.interval is None else predicted.interval.lower
-    if history.is_prediction_informative(lower, question.trials):
+    if is_informative(lower, corrected=history.is_corrected(question.trials)):
         return predicted
     curve = None if predicted.predicted is None else _only(predicted.predicted, question.experiment.output)
     return replace(predicted, predicted=curve, predicted_error=None, interval=None)
@@ -188,12 +188,11 @@ def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
 
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
     curve = None if predicted is None else predicted.predicted
-    interval = None if predicted is None else predicted.interval
     lower, upper = (_edge(curve, channel) for channel in band_channels(question.experiment.output))
     return GainsPrediction(
         gains=dict(question.gains),
         predicted_error=None if predicted is None else predicted.predicted_error,
-        interval=None if interval is None else Interval.model_validate(interval, from_attributes=True),
+        interval=None if predicted is None else predicted.interval,
         curve=_curve(curve, question.experiment.output),
         lower=lower,
         upper=upper,

@@ -32,10 +32,11 @@ from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
+from app.core.tuning.strategy import Interval
 from app.db import trajectories
-from app.db.models import CampaignRow, FlightRow, OptionsJson, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
-from app.db.types import utc_now
+from app.db.types import JsonObject, OptionsJson, utc_now
 from app.vehicles.flight_end import FlightEnd, not_begun
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
@@ -204,10 +205,19 @@ def is_corrected(trials: Sequence[TrialRow], number: float = math.inf) -> bool:
     return any(row.state == TrialState.VALID and row.number < number for row in trials)
 
 
-def is_prediction_informative(lower: float | None, trials: Sequence[TrialRow], number: float = math.inf) -> bool:
-    """Whether a prediction with an interval from `lower` on said anything before this flight; by default, before the
-    next one."""
-    return is_informative(lower, corrected=is_corrected(trials, number))
+def told_prediction(
+    error: float | None, stored: JsonObject | None, *, corrected: bool
+) -> tuple[float | None, Interval | None]:
+    """The stored error and interval of a prediction; both None if they say nothing. `corrected`: whether a flight had
+    corrected the model before."""
+    interval = (
+        None
+        if stored is None
+        else Interval(lower=stored["lower"], upper=stored["upper"], confidence=stored["confidence"])
+    )
+    if not is_informative(None if interval is None else interval.lower, corrected=corrected):
+        return None, None
+    return error, interval
 
 
 def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:

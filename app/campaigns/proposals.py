@@ -23,8 +23,9 @@ from app.core.policy import Gains
 from app.core.tuning.gate import GateResult
 from app.core.tuning.stop_rules import Reason, StopVerdict
 from app.db import trajectories
-from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
-from app.db.types import utc_now
+from app.db.base import added
+from app.db.models import CampaignRow, ProposalRow, TrialRow
+from app.db.types import JsonObject, utc_now
 from app.jobs import service as jobs
 
 PROPOSAL_JOB: Final = "proposal"
@@ -93,8 +94,7 @@ def store_proposal(session: Session, campaign_id: int, computed: ProposalComputa
         advice=asdict(computed.advice),
         spread={**asdict(computed.spread), "flights": list(computed.flights)},
     )
-    session.add(row)
-    session.flush()
+    added(session, row)
     trials = history.trials_of(session, campaign_id)
     if not is_stale(session, campaign, row, trials) and history.find_unreviewed(trials) is None:
         _apply_to_campaign(session, campaign, computed.stop_verdict)
@@ -152,10 +152,9 @@ def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
     """Cancel the unflown trials of stale proposals."""
     trials = history.trials_of(session, campaign.id)
-    waiting = [row for row in trials if row.state in UNFLOWN_TRIAL_STATES and row.proposal_id is not None]
-    proposals = repository.proposals_by_id(session, {row.proposal_id for row in waiting if row.proposal_id})
+    waiting = (row for row in trials if row.state in UNFLOWN_TRIAL_STATES)
     outdated = [
-        row for row in waiting if row.proposal_id and is_stale(session, campaign, proposals[row.proposal_id], trials)
+        row for row in waiting if row.proposal is not None and is_stale(session, campaign, row.proposal, trials)
     ]
     reason = "its proposal is outdated: the campaign's flights have changed"
     cancel_unflown(outdated, history.flight_under_way(session, campaign.id), reason)

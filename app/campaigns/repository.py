@@ -1,21 +1,17 @@
 """Queries on campaigns, proposals, trials and flights."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import datetime
 from typing import Final
 
-from sqlalchemy import ColumnElement, delete, func, literal, or_, select, tuple_, union_all
+from sqlalchemy import ColumnElement, Select, delete, func, or_, select, union_all
 from sqlalchemy.orm import Session, defer, joinedload
 
 from app.campaigns.schemas import Sort
 from app.common.errors import NotFoundError
-from app.common.schemas import Position, decode_cursor, instant
 from app.common.states import CampaignState, TrialState
 from app.db.models import (
     CampaignRow,
     FlightRow,
-    OptionsJson,
     ProposalRow,
     RehearsalRow,
     TrajectoryRow,
@@ -23,7 +19,8 @@ from app.db.models import (
     TrialRow,
     VehicleRow,
 )
-from app.db.types import UtcDateTime
+from app.db.pages import Order
+from app.db.types import OptionsJson
 
 BEST_ERROR: Final = (
     select(func.min(TrialRow.error))
@@ -59,21 +56,17 @@ def curves(session: Session, trial_ids: Collection[int]) -> Mapping[int, list[li
     return {identity: curve for identity, curve in session.execute(wanted) if curve}
 
 
-def trial_page(session: Session, campaign_id: int, *, after_number: int, limit: int) -> tuple[Sequence[TrialRow], int]:
-    """The next `limit` + 1 trials after the given number, and the total count."""
-    total = session.scalar(select(func.count()).where(TrialRow.campaign_id == campaign_id)) or 0
-    rows = session.scalars(
+def trials_wanted(campaign_id: int) -> Select[TrialRow]:
+    """The campaign's trials with the descriptions of their records."""
+    return (
         select(TrialRow)
-        .where(TrialRow.campaign_id == campaign_id, TrialRow.number > after_number)
+        .where(TrialRow.campaign_id == campaign_id)
         .options(
             defer(TrialRow.curve),
             # This column is stored behind the samples: to read it, SQLite would walk through all their pages.
             joinedload(TrialRow.trajectory).defer(TrajectoryRow.created_at),
         )
-        .order_by(TrialRow.number)
-        .limit(limit + 1)
-    ).all()
-    return rows, total
+    )
 
 
 def has_claimed_flight(session: Session, campaign_id: int) -> bool:
@@ -110,22 +103,15 @@ _NO_ERROR: Final = 1e300
 """Sort key of campaigns without an error: they come last."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """Sort order of a list; `kind` is the type of the value in a cursor."""
-
-    value: ColumnElement[datetime] | ColumnElement[str] | ColumnElement[float] | ColumnElement[int]
-    descending: bool
-    kind: type[str] | type[float]
-    is_time: bool = False
-
-
-_ORDERS: Final[Mapping[Sort, _Order]] = {
-    Sort.NEWEST: _Order(CampaignRow.id.expression, True, float),
-    Sort.OLDEST: _Order(CampaignRow.id.expression, False, float),
-    Sort.LATELY_CHANGED: _Order(CampaignRow.updated_at.expression, True, str, is_time=True),
-    Sort.NAME: _Order(func.lower(CampaignRow.name), False, str),
-    Sort.BEST_ERROR: _Order(func.coalesce(BEST_ERROR, _NO_ERROR), False, float),
+ORDERS: Final[Mapping[Sort, Order]] = {
+    sort: Order(sort, value, descending=sort.startswith("-"))
+    for sort, value in (
+        (Sort.NEWEST, CampaignRow.id.expression),
+        (Sort.OLDEST, CampaignRow.id.expression),
+        (Sort.LATELY_CHANGED, CampaignRow.updated_at.expression),
+        (Sort.NAME, func.lower(CampaignRow.name)),
+        (Sort.BEST_ERROR, func.coalesce(BEST_ERROR, _NO_ERROR)),
+    )
 }
 
 
@@ -147,43 +133,14 @@ def names_beginning(session: Session, beginning: str) -> set[str]:
     return set(session.scalars(select(CampaignRow.name).where(CampaignRow.name.startswith(beginning, autoescape=True))))
 
 
-def campaign_page(
-    session: Session,
-    *,
-    search: str,
-    states: Collection[CampaignState],
-    vehicles: Collection[str],
-    sort: Sort,
-    cursor: str | None,
-    limit: int,
-) -> tuple[list[tuple[CampaignRow, Position]], int]:
-    """The next `limit` + 1 campaigns after the cursor, each with its position; and the total count.
-
-    Raises InputError for a cursor of another list.
-    """
+def campaigns_wanted(search: str, states: Collection[CampaignState], vehicles: Collection[str]) -> Select[CampaignRow]:
+    """Campaigns whose name contains `search`, in those states, on vehicles of those kinds; of all if empty."""
     wanted: list[ColumnElement[bool]] = [
         *([CampaignRow.name.icontains(search, autoescape=True)] if search else []),
         *([CampaignRow.state.in_(states)] if states else []),
         *([VehicleRow.kind.in_(vehicles)] if vehicles else []),
     ]
-    total = session.scalar(select(func.count(CampaignRow.id)).join(CampaignRow.vehicle).where(*wanted)) or 0
-    order = _ORDERS[sort]
-    if cursor is not None:
-        after = decode_cursor(sort, cursor, order.kind)
-        value = literal(instant(after[0]), UtcDateTime()) if order.is_time else literal(after[0])
-        here, there = tuple_(order.value, CampaignRow.id), tuple_(value, literal(after[1]))
-        wanted.append(here < there if order.descending else here > there)
-    directed = (order.value.desc(), CampaignRow.id.desc()) if order.descending else (order.value, CampaignRow.id)
-    found = session.execute(
-        select(CampaignRow, order.value).join(CampaignRow.vehicle).where(*wanted).order_by(*directed).limit(limit + 1)
-    ).all()
-    return [(row, (_in_cursor(value), row.id)) for row, value in found], total
-
-
-def _in_cursor(value: object) -> str | float:
-    if isinstance(value, datetime):
-        return value.isoformat()
-    return value if isinstance(value, int | float) else str(value)
+    return select(CampaignRow).join(CampaignRow.vehicle).where(*wanted)
 
 
 def unflown_on(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
@@ -208,11 +165,6 @@ def rehearsed_ids(session: Session, campaign_ids: Collection[int]) -> Mapping[in
     """The campaigns that these rehearse, by the id of the rehearsal."""
     wanted = select(RehearsalRow).where(RehearsalRow.rehearsal_id.in_(campaign_ids))
     return {row.rehearsal_id: row.campaign_id for row in session.scalars(wanted)}
-
-
-def proposals_by_id(session: Session, proposal_ids: Collection[int]) -> Mapping[int, ProposalRow]:
-    found = session.scalars(select(ProposalRow).where(ProposalRow.id.in_(proposal_ids)))
-    return {row.id: row for row in found}
 
 
 def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:

@@ -9,7 +9,6 @@ from app.campaigns import figure_data, flight_predictions, landscapes, proposals
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
-    CampaignStatistics,
     CampaignSummary,
     Clone,
     ConsideredGains,
@@ -20,7 +19,7 @@ from app.campaigns.schemas import (
     Promotion,
     Sort,
 )
-from app.campaigns.statistics import campaign_statistics
+from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.wear import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import FigureCard, Page, figure_card
@@ -159,6 +158,27 @@ figures_router = APIRouter(prefix="/api", tags=["figures"])
 FigureName = Literal["takeoffs", "errors", "gains"]
 
 
+@figures_router.get("/campaigns/{campaign_id}/figures/landscape")
+def get_landscape(
+    database: CurrentDatabase,
+    asking: RequestContextDep,
+    campaign_id: Id,
+    theme: Theme = "light",
+    stacked: Annotated[bool, Query(description="one column of slices, for a narrow page")] = False,
+) -> FigureCard:
+    """The gains as a path over the error that the strategy's model predicts, two gains at a time.
+
+    A job computes it for each proposal, started at the first request by a client that may make changes; until it is
+    done the card is `waiting`.
+    """
+    with database.read() as session:
+        asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
+    if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
+        with database.write() as session:
+            landscapes.request_landscape(session, campaign_id)
+    return figure_card(asked.card)
+
+
 @figures_router.get("/campaigns/{campaign_id}/figures/{name}")
 def get_campaign_figure(
     session: Reader,
@@ -201,30 +221,6 @@ def _window(from_s: float | None, to_s: float | None) -> Range | None:
 def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> FigureCard:
     """One flight, with its prediction and its commands."""
     return figure_card(figure_data.flight_figure(session, trial_id, theme))
-
-
-landscape_router = APIRouter(prefix="/api", tags=["figures"])
-
-
-@landscape_router.get("/campaigns/{campaign_id}/figures/landscape")
-def get_landscape(
-    database: CurrentDatabase,
-    asking: RequestContextDep,
-    campaign_id: Id,
-    theme: Theme = "light",
-    stacked: Annotated[bool, Query(description="one column of slices, for a narrow page")] = False,
-) -> FigureCard:
-    """The gains as a path over the error that the strategy's model predicts, two gains at a time.
-
-    A job computes it for each proposal, started at the first request by a client that may make changes; until it is
-    done the card is `waiting`.
-    """
-    with database.read() as session:
-        asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
-    if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
-        with database.write() as session:
-            landscapes.request_landscape(session, campaign_id)
-    return figure_card(asked.card)
 
 
 vehicles_router = APIRouter(prefix="/api/vehicles", tags=["vehicles"])

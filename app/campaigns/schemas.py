@@ -10,7 +10,6 @@ from app.autopilots.experiments import EXPERIMENTS
 from app.common.schemas import (
     Gains,
     Gate,
-    Interval,
     Name,
     Number,
     OptionValue,
@@ -31,9 +30,9 @@ from app.core.tuning.definition_checks import (
     MIN_CEILING_M,
     MIN_CONFIDENCE,
 )
-from app.core.tuning.proposals import AdviceKind
+from app.core.tuning.proposals import Advice, AdviceKind
 from app.core.tuning.strategies import recommended_strategy
-from app.core.tuning.strategy import Explanation, Kind
+from app.core.tuning.strategy import Explanation, Interval, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
 # The ranges of a definition are documented here and checked in app.core.tuning.definition_checks with everything else,
@@ -310,15 +309,6 @@ class StopVerdict(Schema):
     threshold: Annotated[float | None, Field(description="error below which the next flight counts as better")]
 
 
-class Advice(Schema):
-    """The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
-    first flight, or its gains again."""
-
-    kind: AdviceKind
-    gains: Gains
-    why: str
-
-
 Variant = Literal["smaller step", "repeat", "baseline"]
 ChoiceKind = Literal["step", "smaller step", "repeat", "baseline"]
 
@@ -387,92 +377,3 @@ class GainsPrediction(Schema):
     curve: PredictedCurve | None
     lower: PredictedCurve | None
     upper: PredictedCurve | None
-
-
-class RepeatGroup(Schema):
-    """The valid flights of one gain set."""
-
-    gains: Gains
-    trial_numbers: list[int]
-    errors: list[float]
-    mean: float
-    standard_error: Annotated[float | None, Field(description="from the pooled scatter; null while that is unknown")]
-    is_baseline: bool
-    is_best: bool
-
-
-class FlightsToDecide(Schema):
-    """Further flights of each gain set after which an unchanged difference would be decided."""
-
-    best: int
-    baseline: int
-
-
-class Comparison(Schema):
-    """The best gains compared with the first flight's. `difference` is best − baseline; `confidence` that of the
-    likelier direction, with the allowance for having chosen the best among several. While the scatter of flights is
-    unknown, the verdict is `not known yet`, without confidence and standard error."""
-
-    verdict: Verdict
-    confidence: float | None
-    difference: float
-    standard_error: float | None
-    further: FlightsToDecide | None
-    sentence: str
-
-
-class Drift(Schema):
-    """Change of the error with the same gains over the campaign: `confidence` that anything has changed; `resolved`
-    from 90 % on."""
-
-    first_trial: int
-    last_trial: int
-    difference: float
-    standard_error: float
-    confidence: float
-    resolved: bool
-    sentence: str
-
-
-class Trend(Schema):
-    """Slope of the error of the gains flown most often against the battery voltage, with its 90 % interval."""
-
-    unit: str
-    slope: float
-    lower: float
-    upper: float
-    sentence: str
-
-
-class TrackRecord(Schema):
-    """How well the predictions held."""
-
-    inside: int
-    of: int
-    share: float | None
-    agreeing: int
-    disagreeing: int
-    trustworthy: bool
-    sentence: str
-
-
-class CampaignStatistics(Schema):
-    """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
-    experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
-    measured, and zero if all repeats gave the same error. `scatter_source` states its source. `optimism` is how
-    much the best is expected to look better than it is because it was chosen, and `shrunk_error` its error corrected
-    for that."""
-
-    error_unit: str
-    confidence: float
-    sigma: float | None
-    degrees_of_freedom: float
-    scatter_source: str
-    groups: list[RepeatGroup]
-    comparison: Comparison | None
-    drift: Drift | None
-    battery_trend: Trend | None
-    optimism: float
-    shrunk_error: float | None
-    track_record: TrackRecord
-    notes: list[str]

@@ -6,6 +6,7 @@ safe gains once flights have shown that they are better.
 
 import re
 from collections.abc import Collection
+from functools import partial
 from itertools import count
 from typing import Final
 
@@ -35,11 +36,13 @@ from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
-from app.common.schemas import LONGEST_NAME, OptionValue, Page, encode_cursor
+from app.common.schemas import LONGEST_NAME, OptionValue, Page
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.formatting import confidence_text, format_gains, named_flights
+from app.db.base import added
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
+from app.db.pages import page_of
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.fleet.registration import promote_gains
@@ -60,11 +63,8 @@ def list_campaigns(
     cursor: str | None,
 ) -> Page[CampaignSummary]:
     """One page of summaries. Raises InputError for a cursor of another list."""
-    found, total = repository.campaign_page(
-        session, search=search, states=states, vehicles=vehicles, sort=sort, cursor=cursor, limit=limit
-    )
-    following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
-    return Page(items=summaries(session, [row for row, _ in found[:limit]]), total=total, next_cursor=following)
+    wanted, order = repository.campaigns_wanted(search, states, vehicles), repository.ORDERS[sort]
+    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=partial(summaries, session))
 
 
 def get_row(session: Session, campaign_id: int) -> CampaignRow:
@@ -105,14 +105,13 @@ def get_campaign(session: Session, campaign_id: int) -> Campaign:
 
 def create_campaign(session: Session, new: NewCampaign) -> Campaign:
     """Create a draft and request its first proposal. Raises InputError that names every invalid field."""
-    row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
-    return campaign_view(session, row)
+    return campaign_view(session, add_campaign(session, new.name, new.definition, new.vehicle))
 
 
 def create_ready_campaign(session: Session, new: NewCampaign) -> int:
     """Create a campaign whose first flights have been flown already: it takes them without a proposal. Returns its id.
     Raises InputError that names every invalid field."""
-    row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
+    row = add_campaign(session, new.name, new.definition, new.vehicle)
     set_campaign_state(row, CampaignState.READY)
     return row.id
 
@@ -123,7 +122,7 @@ def add_campaign(
     asked: Definition,
     choice: VehicleChoice,
     *,
-    parent_id: int | None,
+    parent_id: int | None = None,
     safe_gains: dict[str, float] | None = None,
 ) -> CampaignRow:
     """Add a draft and request its first proposal.
@@ -143,8 +142,7 @@ def add_campaign(
         parent_id=parent_id,
         safe_gains=safe_gains,
     )
-    session.add(row)
-    session.flush()
+    added(session, row)
     request_proposal(session, row)
     return row
 
@@ -166,8 +164,7 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     definition = _definition_for(origin, vehicle)
     if clone.warm_start:
         definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})
-    row = add_campaign(session, name, definition, vehicle, parent_id=origin.id)
-    return campaign_view(session, row)
+    return campaign_view(session, add_campaign(session, name, definition, vehicle, parent_id=origin.id))
 
 
 def _get_permitted(session: Session, campaign_id: int, context: RequestContext) -> CampaignRow:
@@ -381,7 +378,6 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
         parent_id=row.id,
         safe_gains=dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains),
     )
-    session.add(RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
-    session.flush()
+    added(session, RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
     notify_rehearsed_campaign(session, made)
     return campaign_view(session, made)

@@ -1,25 +1,18 @@
-"""API view of a campaign's statistics."""
+"""Statistics of a campaign's flights, as the API sends them."""
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Annotated, Final
 
+from pydantic import Field
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
-from app.campaigns.schemas import (
-    BestTrial,
-    CampaignStatistics,
-    Comparison,
-    Drift,
-    FlightsToDecide,
-    RepeatGroup,
-    TrackRecord,
-    Trend,
-)
+from app.campaigns.schemas import BestTrial
+from app.common.schemas import Gains, Schema
 from app.core.experiments.base import Experiment
 from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, signed
-from app.core.statistics.comparisons import Group, PooledScatter, drift_of, optimism, pool_scatter, trend_of
+from app.core.statistics.comparisons import Group, PooledScatter, Verdict, drift_of, optimism, pool_scatter, trend_of
 from app.core.tuning import predictions
 from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
 from app.db.models import CampaignRow, TrialRow, VehicleRow
@@ -31,6 +24,95 @@ _NO_OPTIMISM: Final = 0.05
 
 _LEAST_OPTIMISM: Final = 1e-9
 """Smaller optimism, in units of the error, is what the numerical integral leaves of zero."""
+
+
+class RepeatGroup(Schema):
+    """The valid flights of one gain set."""
+
+    gains: Gains
+    trial_numbers: list[int]
+    errors: list[float]
+    mean: float
+    standard_error: Annotated[float | None, Field(description="from the pooled scatter; null while that is unknown")]
+    is_baseline: bool
+    is_best: bool
+
+
+class FlightsToDecide(Schema):
+    """Further flights of each gain set after which an unchanged difference would be decided."""
+
+    best: int
+    baseline: int
+
+
+class Comparison(Schema):
+    """The best gains compared with the first flight's. `difference` is best − baseline; `confidence` that of the
+    likelier direction, with the allowance for having chosen the best among several. While the scatter of flights is
+    unknown, the verdict is `not known yet`, without confidence and standard error."""
+
+    verdict: Verdict
+    confidence: float | None
+    difference: float
+    standard_error: float | None
+    further: FlightsToDecide | None
+    sentence: str
+
+
+class Drift(Schema):
+    """Change of the error with the same gains over the campaign: `confidence` that anything has changed; `resolved`
+    from 90 % on."""
+
+    first_trial: int
+    last_trial: int
+    difference: float
+    standard_error: float
+    confidence: float
+    resolved: bool
+    sentence: str
+
+
+class Trend(Schema):
+    """Slope of the error of the gains flown most often against the battery voltage, with its 90 % interval."""
+
+    unit: str
+    slope: float
+    lower: float
+    upper: float
+    sentence: str
+
+
+class TrackRecord(Schema):
+    """How well the predictions held."""
+
+    inside: int
+    of: int
+    share: float | None
+    agreeing: int
+    disagreeing: int
+    trustworthy: bool
+    sentence: str
+
+
+class CampaignStatistics(Schema):
+    """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
+    experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
+    measured, and zero if all repeats gave the same error. `scatter_source` states its source. `optimism` is how
+    much the best is expected to look better than it is because it was chosen, and `shrunk_error` its error corrected
+    for that."""
+
+    error_unit: str
+    confidence: float
+    sigma: float | None
+    degrees_of_freedom: float
+    scatter_source: str
+    groups: list[RepeatGroup]
+    comparison: Comparison | None
+    drift: Drift | None
+    battery_trend: Trend | None
+    optimism: float
+    shrunk_error: float | None
+    track_record: TrackRecord
+    notes: list[str]
 
 
 def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistics:

@@ -11,7 +11,6 @@ from app.campaigns import history, repository
 from app.campaigns.proposals import PROPOSAL_JOB, is_stale
 from app.campaigns.rehearsals import is_rehearsal_satisfied, passed_rehearsals, rehearsal_of
 from app.campaigns.schemas import (
-    Advice,
     Campaign,
     CampaignSummary,
     FlightChoice,
@@ -29,18 +28,18 @@ from app.campaigns.schemas import (
 from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
 from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
-from app.common.schemas import Gate, Interval, Trouble
+from app.common.schemas import Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
 from app.core.definition import aborted_by_gains
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
-from app.core.tuning.strategy import Explanation
+from app.core.tuning.proposals import Advice
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs
 
 SPARKS: Final = 7
-_EXPLANATION: Final = TypeAdapter(Explanation)
+_ADVICE: Final = TypeAdapter(Advice)
 
 _NEXT_ACTIONS: Final[Mapping[CampaignState, str]] = {
     CampaignState.DRAFT: "Wait for the first gains",
@@ -159,29 +158,22 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         stop=stop["stop"], reason=stop["reason"] or "", sentence=stop["why"], threshold=stop["threshold"]
     )
     advice = _advice(row, verdict)
-    interval = None if row.interval is None else Interval.model_validate(row.interval)
-    lower = None if interval is None else interval.lower
-    predicts = history.is_prediction_informative(lower, trials)
-    return Proposal(
-        id=row.id,
-        campaign_id=row.campaign_id,
-        kind=row.kind,
+    predicted_error, interval = history.told_prediction(
+        row.predicted_error, row.interval, corrected=history.is_corrected(trials)
+    )
+    return Proposal.view_of(
+        row,
         recommended=advice.kind,
         advice=advice,
-        gains=row.gains,
         changes={
             name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
             for name, value in row.gains.items()
         },
         choices=_choices(campaign, row, trials, advice),
-        predicted_error=row.predicted_error if predicts else None,
-        interval=interval if predicts else None,
-        explanation=_EXPLANATION.validate_python(row.explanation),
-        gate=Gate.model_validate(row.gate),
+        predicted_error=predicted_error,
+        interval=interval,
         stop_verdict=verdict,
-        history_digest=row.history_digest,
         stale=is_stale(session, campaign, row, trials),
-        computed_at=row.computed_at,
     )
 
 
@@ -209,7 +201,7 @@ def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]
 def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
     """The advice as stored; for rows of releases without advice, the stop rule's verdict and the proposal."""
     if row.advice is not None:
-        return Advice.model_validate(row.advice)
+        return _ADVICE.validate_python(row.advice)
     return Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
 
 

@@ -18,16 +18,6 @@ from app.fleet import service as fleet
 _STRATEGY: Final = "calibrated"
 
 
-class FittedNumber(Schema):
-    """A fitted parameter of the model with its standard error."""
-
-    name: str
-    title: str
-    unit: str
-    value: float
-    standard_error: float
-
-
 class Estimate(Schema):
     """One calibration. `flight` counts the vehicle's flights over all its campaigns."""
 
@@ -36,7 +26,7 @@ class Estimate(Schema):
     trial_number: int
     proposal_id: int
     at: datetime
-    fitted: list[FittedNumber]
+    fitted: list[Fitted]
 
 
 class Retune(Schema):
@@ -72,12 +62,7 @@ def vehicle_figure(session: Session, vehicle_id: int, name: str, theme: ThemeNam
         return card_of(BatteriesFigure(tuple(flights), theme))
     found = calibration_of(session, vehicle_id)
     points = tuple(
-        Point(
-            flight=one.flight,
-            campaign_id=one.campaign_id,
-            trial_number=one.trial_number,
-            fitted=_by_name(one),
-        )
+        Point(flight=one.flight, campaign_id=one.campaign_id, trial_number=one.trial_number, fitted=_by_name(one))
         for one in found.estimates
     )
     return card_of(CalibrationFigure(points, found.retune.since, found.retune.sentence, theme))
@@ -130,7 +115,7 @@ def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
         trial_number=number,
         proposal_id=row.id,
         at=row.computed_at,
-        fitted=[FittedNumber.model_validate(fitted[name]) for name in MONITORED_PARAMETERS if name in fitted],
+        fitted=[fitted[name] for name in MONITORED_PARAMETERS if name in fitted],
     )
 
 
@@ -151,7 +136,4 @@ def _retune(estimates: Sequence[Estimate], ends: Sequence[int]) -> Retune:
 
 
 def _by_name(one: Estimate) -> dict[str, Fitted]:
-    return {
-        each.name: Fitted(title=each.title, unit=each.unit, value=each.value, standard_error=each.standard_error)
-        for each in one.fitted
-    }
+    return {each.name: each for each in one.fitted}

@@ -5,8 +5,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from app.cli.console import console, table, unwritable_error, write_json
-from app.cli.files import companion_of, unreadable_error
+from app.cli.console import console, reading, table, write_json, writing
+from app.cli.files import companion_of
 from app.common.errors import InputError, Problem
 from app.log_analyses.content import ANALYSED, analyze_content
 from app.log_analyses.schemas import LogAnswer
@@ -17,11 +17,9 @@ def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -
 
     Raises InputError for a log that cannot be analysed, and for a parameter file where nothing is proposed.
     """
-    try:
+    with reading(file, ANALYSED):
         beside = companion_of(file)
         content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
-    except OSError as error:
-        raise unreadable_error(file, error, ANALYSED) from error
     answer = analyze_content(content, companion, file.name).answer
     _print(console(json_out), answer)
     write_json(json_out, answer.model_dump(mode="json"))
@@ -46,7 +44,5 @@ def _write_parameters(target: Path, answer: LogAnswer) -> None:
             hint=answer.answer,
             problems=(Problem("--params", "has nothing to write"),),
         )
-    try:
+    with writing("--params", target):
         target.write_text(answer.parameter_file.content, encoding="utf-8")
-    except OSError as error:
-        raise unwritable_error("--params", target, error) from error

@@ -1,22 +1,45 @@
 """The `gainline` command. Each command imports what it needs when it runs, so that help comes at once."""
 
-from collections.abc import Callable
-from enum import StrEnum
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from typer.core import TyperGroup
 
+from app.cli.options import (
+    CampaignSource,
+    DataDir,
+    GivenCampaign,
+    GivenGains,
+    GivenSettings,
+    JsonOut,
+    Overrule,
+    Reproducible,
+    StartGains,
+    spare_other_parameters,
+)
 from app.core.errors import GainlineError
 
 if TYPE_CHECKING:
     from app.common.settings import Settings
 
-P = ParamSpec("P")
+
+class _Reporting(TyperGroup):
+    """Commands whose errors, the program's own ones, are printed for a person, with exit code 1."""
+
+    def invoke(self, ctx: Any) -> Any:  # of a type that typer does not export
+        try:
+            return super().invoke(ctx)
+        except GainlineError as error:
+            from app.cli.console import show_error
+
+            show_error(error)
+            raise typer.Exit(1) from error
+
 
 app = typer.Typer(
     name="gainline",
+    cls=_Reporting,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -26,110 +49,7 @@ controller = typer.Typer(no_args_is_help=True, help="Check the replica of the au
 app.add_typer(controller, name="controller")
 
 
-def _begins_otherwise(target: Path | None, *beginnings: bytes) -> bool:
-    """Whether a file exists that is not empty and begins otherwise, such as a log that was to be read."""
-    if target is None or not target.is_file():
-        return False
-    with target.open("rb") as stream:
-        head = stream.read(max(map(len, beginnings)))
-    return bool(head) and not head.startswith(beginnings)
-
-
-def _spare_recording(target: Path | None) -> Path | None:
-    """Refuse to write the result over a file that is no JSON."""
-    if _begins_otherwise(target, b"{"):
-        raise typer.BadParameter(
-            f"{target} exists and is not a JSON file, so it is not overwritten. Name another file, or - to print the "
-            "result."
-        )
-    return target
-
-
-def _spare_other_parameters(target: Path | None) -> Path | None:
-    """Refuse to write gains over a file that does not begin as one of them does."""
-    if _begins_otherwise(target, b"# Gainline", b"<!-- Gainline", b"PSC_"):
-        raise typer.BadParameter(
-            f"{target} exists and was not written by this command, so it is not overwritten. Name another file."
-        )
-    return target
-
-
-JsonOut = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.", callback=_spare_recording),
-]
-DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [default: GAINLINE_DATA_DIR]")]
-CampaignSource = Annotated[
-    str,
-    typer.Argument(
-        metavar="PRESET|FILE.yaml",
-        show_default=False,
-        help="A preset, such as ardrone-takeoff or paper-ardrone-takeoff, or a campaign file.",
-    ),
-]
-GivenCampaign = Annotated[str, typer.Argument(metavar="ID|NAME", show_default=False, help="The campaign.")]
-StartGains = Annotated[
-    str | None,
-    typer.Option(metavar="default|simplex|KP,KI,KD", show_default=False, help="Source of the first flight's gains."),
-]
-GivenSettings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        show_default=False,
-        help=(
-            "A setting of the vehicle (scatter=0, wind_m_s=3), the strategy (scaled=false) or the stop rule "
-            "(improvement=0.02). Repeatable."
-        ),
-    ),
-]
-GivenGains = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--gains",
-        metavar="NAME=NUMBER,…",
-        show_default=False,
-        help="A gain set to fly with the `manual` strategy. Repeatable; the sets are flown in this order.",
-    ),
-]
-Overrule = Annotated[
-    str,
-    typer.Option(
-        metavar="REASON", show_default=False, help="Reason to fly gains that the gate refuses (simulations only)."
-    ),
-]
-
-
-class Reproducible(StrEnum):
-    """Reproductions of `gainline reproduce`."""
-
-    F16 = "f16"
-    TABLE1 = "table1"
-    TABLE2 = "table2"
-    CONTROLLER = "controller"
-    VARIABILITY = "variability"
-    ALL = "all"
-
-
-def report_errors(command: Callable[P, None]) -> Callable[P, None]:
-    """The command, with the program's own errors printed and exit code 1."""
-
-    @wraps(command)
-    def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        try:
-            command(*args, **kwargs)
-        except GainlineError as error:
-            from app.cli.console import show_error
-
-            show_error(error)
-            raise typer.Exit(1) from error
-
-    return run
-
-
 @app.command()
-@report_errors
 def serve(
     host: Annotated[
         str | None,
@@ -154,11 +74,9 @@ def serve(
 
 
 @app.command()
-@report_errors
 def unlock(
     script: Annotated[
-        bool,
-        typer.Option("--script", help="Print a script's token instead, to send as `Authorization: Bearer TOKEN`."),
+        bool, typer.Option("--script", help="Print a script's token instead, to send as `Authorization: Bearer TOKEN`.")
     ] = False,
     data_dir: DataDir = None,
 ) -> None:
@@ -169,7 +87,6 @@ def unlock(
 
 
 @app.command()
-@report_errors
 def worker(data_dir: DataDir = None) -> None:
     """Run the worker for a server that was started with --no-worker."""
     from app.runtime.worker import run_worker
@@ -178,23 +95,17 @@ def worker(data_dir: DataDir = None) -> None:
 
 
 @app.command()
-@report_errors
 def run(
     campaign: CampaignSource,
     vehicle: Annotated[
-        str | None,
-        typer.Option(help="jsbsim, twin, lti, or mavlink:ADDRESS with --set simulated=true.", show_default=False),
+        str | None, typer.Option(help="jsbsim, twin, lti, or mavlink:ADDRESS with --set simulated=true.")
     ] = None,
-    strategy: Annotated[
-        str | None, typer.Option(help="Strategy that computes the next gains.", show_default=False)
-    ] = None,
+    strategy: Annotated[str | None, typer.Option(help="Strategy that computes the next gains.")] = None,
     start: StartGains = None,
     gains: GivenGains = None,
     settings: GivenSettings = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers.", show_default=False)] = None,
-    max_flights: Annotated[
-        int | None, typer.Option(min=1, max=200, help="Maximum number of flights.", show_default=False)
-    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers.")] = None,
+    max_flights: Annotated[int | None, typer.Option(min=1, max=200, help="Maximum number of flights.")] = None,
     overrule: Overrule = "",
     json_out: JsonOut = None,
     data_dir: DataDir = None,
@@ -217,28 +128,23 @@ def run(
 
 
 @app.command()
-@report_errors
 def reproduce(
     what: Annotated[Reproducible, typer.Argument(help="Experiment or table of the paper.")],
     full: Annotated[
         bool, typer.Option("--full", help="The long version, if there is one; takes several minutes.")
     ] = False,
     trace: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", show_default=False, help="For `controller`: another recorded run, .csv or .csv.gz."
-        ),
+        Path | None, typer.Option(metavar="FILE", help="For `controller`: another recorded run, .csv or .csv.gz.")
     ] = None,
     json_out: JsonOut = None,
 ) -> None:
     """Run the paper's experiments and print measured values, published values and their ratios."""
     from app.cli.reproduce import reproduce as run
 
-    run(what.value, full=full, trace=trace, json_out=json_out)
+    run(what, full=full, trace=trace, json_out=json_out)
 
 
 @app.command("sim-drone")
-@report_errors
 def sim_drone(
     autopilot: Annotated[
         str | None,
@@ -252,7 +158,6 @@ def sim_drone(
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            show_default=False,
             help="Address of the ground station and, after @, local port of the drone: "
             "udp:HOST:PORT[@LOCALPORT]. [default: udp:127.0.0.1:4244@4245 for Paparazzi, else "
             "udp:127.0.0.1:14550]",
@@ -260,10 +165,7 @@ def sim_drone(
     ] = None,
     vehicle: Annotated[str, typer.Option(help="Flight model: jsbsim or twin.")] = "jsbsim",
     settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="NAME=NUMBER", show_default=False, help="Setting of the flight model. Repeatable."
-        ),
+        list[str] | None, typer.Option("--set", metavar="NAME=NUMBER", help="Setting of the flight model. Repeatable.")
     ] = None,
     seed: Annotated[
         int, typer.Option(min=0, help="Seed of the first flight; each later flight uses the next seed.")
@@ -282,12 +184,11 @@ def sim_drone(
         list[str] | None,
         typer.Option(
             metavar="NAME[:DURATION]@T",
-            show_default=False,
             help="Fault to inject T s after the takeoff command, or @connect; docs/sim-drone.md lists the "
             "faults. Repeatable.",
         ),
     ] = None,
-    system: Annotated[int | None, typer.Option(min=1, max=255, show_default=False, help="MAVLink system id.")] = None,
+    system: Annotated[int | None, typer.Option(min=1, max=255, help="MAVLink system id.")] = None,
     failsafes: Annotated[
         bool,
         typer.Option(
@@ -299,7 +200,6 @@ def sim_drone(
         str | None,
         typer.Option(
             metavar="SOURCE",
-            show_default=False,
             help="Simulate motion capture of the drone: natnet:HOST?body=ID, odometry (on its own link), or "
             "mavlink:ADDRESS.",
         ),
@@ -326,23 +226,20 @@ def sim_drone(
 
 
 @app.command(name="import")
-@report_errors
 def import_log(
     file: Annotated[
         Path,
         typer.Argument(
             metavar="FILE",
-            show_default=False,
             help="MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data (a .log next to it is read too), or CSV.",
         ),
     ],
-    campaign: Annotated[str, typer.Option(metavar="ID|NAME", show_default=False, help="Campaign of the flight.")],
+    campaign: Annotated[str, typer.Option(metavar="ID|NAME", help="Campaign of the flight.")],
     trial: Annotated[
-        int | None,
-        typer.Option(min=1, show_default=False, help="Number of the trial, if more than one waits for its record."),
+        int | None, typer.Option(min=1, help="Number of the trial, if more than one waits for its record.")
     ] = None,
     takeoff: Annotated[
-        int | None, typer.Option(min=1, show_default=False, help="Number of the takeoff, if the log contains several.")
+        int | None, typer.Option(min=1, help="Number of the takeoff, if the log contains several.")
     ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Accept the gains in the log if they differ from the planned ones.")
@@ -358,13 +255,11 @@ def import_log(
 
 
 @app.command()
-@report_errors
 def analyze(
     log: Annotated[
         Path,
         typer.Argument(
             metavar="LOG",
-            show_default=False,
             help="ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data "
             "(a .log next to it is read too) or .tlog of takeoffs.",
         ),
@@ -373,10 +268,9 @@ def analyze(
         Path | None,
         typer.Option(
             metavar="FILE",
-            show_default=False,
             help="Write the proposed gains: a .param file for ArduCopter, a .params file for PX4, a section of an "
             "airframe file for Paparazzi.",
-            callback=_spare_other_parameters,
+            callback=spare_other_parameters,
         ),
     ] = None,
     json_out: JsonOut = None,
@@ -388,18 +282,14 @@ def analyze(
 
 
 @app.command()
-@report_errors
 def report(
     campaign: GivenCampaign,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", show_default=False, help="Output file.  [default: campaign-ID-report.html]"),
+        Path | None, typer.Option(metavar="FILE", help="Output file.  [default: campaign-ID-report.html]")
     ] = None,
     kind: Annotated[
         Literal["html", "pdf"] | None,
-        typer.Option(
-            "--format", show_default=False, help="html or pdf.  [default: from the extension of FILE, else html]"
-        ),
+        typer.Option("--format", help="html or pdf.  [default: from the extension of FILE, else html]"),
     ] = None,
     data_dir: DataDir = None,
 ) -> None:
@@ -410,12 +300,10 @@ def report(
 
 
 @app.command()
-@report_errors
 def bundle(
     campaign: GivenCampaign,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", show_default=False, help="Output file.  [default: campaign-ID.gainline.zip]"),
+        Path | None, typer.Option(metavar="FILE", help="Output file.  [default: campaign-ID.gainline.zip]")
     ] = None,
     data_dir: DataDir = None,
 ) -> None:
@@ -426,11 +314,8 @@ def bundle(
 
 
 @app.command()
-@report_errors
 def unbundle(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", show_default=False, help="Bundle written by `gainline bundle`.")
-    ],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Bundle written by `gainline bundle`.")],
     data_dir: DataDir = None,
 ) -> None:
     """Import a campaign from another installation, with identical numbers."""
@@ -440,7 +325,6 @@ def unbundle(
 
 
 @controller.command()
-@report_errors
 def replay(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE…", help="Recorded runs, .csv or .csv.gz; .bin logs of ArduCopter.")
@@ -455,15 +339,12 @@ def replay(
 
 
 @controller.command()
-@report_errors
 def check(
     files: Annotated[
         list[Path],
         typer.Argument(metavar="FILE…", help="Paparazzi .data files with VERT_LOOP, each with its .log next to it."),
     ],
-    gains: Annotated[
-        str | None, typer.Option(metavar="KP,KI,KD", show_default=False, help="Gains flown, if no log contains them.")
-    ] = None,
+    gains: Annotated[str | None, typer.Option(metavar="KP,KI,KD", help="Gains flown, if no log contains them.")] = None,
     json_out: JsonOut = None,
 ) -> None:
     """Compare flight logs of the vertical loop with the replica; exit code 1 if they differ or cannot be read."""
@@ -478,7 +359,3 @@ def _settings(**given: str | int | Path | None) -> "Settings":
     from app.common.settings import read_settings
 
     return read_settings({name: value for name, value in given.items() if value is not None})
-
-
-if __name__ == "__main__":
-    app()

@@ -2,7 +2,8 @@
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -52,16 +53,30 @@ def write_json(target: Path | None, document: Mapping[str, object]) -> None:
     if target == TO_STDOUT:
         sys.stdout.write(text)
         return
-    try:
+    with writing("--json", target):
         target.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def writing(option: str, target: Path) -> Iterator[None]:
+    """Raise InputError where the output file, given with `option`, cannot be written."""
+    try:
+        yield
     except OSError as error:
-        raise unwritable_error("--json", target, error) from error
+        raise InputError(
+            f"{target} could not be written: {error.strerror or error}.",
+            problems=(Problem(option, "cannot be written"),),
+            hint="Choose a file in an existing folder with enough free space.",
+        ) from error
 
 
-def unwritable_error(option: str, target: Path, error: OSError) -> InputError:
-    """Error for an output file, given with `option`, that cannot be written."""
-    return InputError(
-        f"{target} could not be written: {error.strerror or error}.",
-        problems=(Problem(option, "cannot be written"),),
-        hint="Choose a file in an existing folder with enough free space.",
-    )
+@contextmanager
+def reading(file: Path, needed: str) -> Iterator[None]:
+    """Raise InputError where the input file cannot be opened or read; `needed` names the kind of file with its
+    article."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{file} could not be read: {error.strerror or error}.", hint=f"Give {needed} that this user can read."
+        ) from error

@@ -17,7 +17,7 @@ from app.bundles.reader import Bundle
 from app.campaigns import service as campaigns
 from app.campaigns.trials import records
 from app.campaigns.trials.schemas import Trial
-from app.cli.console import console, unwritable_error, write_json
+from app.cli.console import console, reading, write_json, writing
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
 from app.core.formatting import count, format_gains
@@ -62,15 +62,6 @@ def _open_database(settings: Settings) -> Iterator[Database]:
         yield database
 
 
-def unreadable_error(file: Path, error: OSError, needed: str) -> InputError:
-    """Error for an input file that cannot be opened or read; `needed` names the kind of file with its
-    article."""
-    return InputError(
-        f"{file} could not be read: {error.strerror or error}.",
-        hint=f"Give {needed} that this user can read.",
-    )
-
-
 def can_ask() -> bool:
     """Whether standard input is a terminal, so that a person can be asked."""
     return sys.stdin.isatty()
@@ -85,14 +76,11 @@ def companion_of(file: Path) -> Path | None:
 def _read(file: Path, takeoff: int | None) -> Takeoff:
     from app.autopilots.readers import read_takeoff  # noqa: PLC0415 - imports every reader
 
-    try:
-        with ExitStack() as files:
-            stream = files.enter_context(file.open("rb"))
-            beside = companion_of(file)
-            companion = None if beside is None else files.enter_context(beside.open("rb"))
-            return read_takeoff(stream, name=file.name, number=takeoff, companion=companion)
-    except OSError as error:
-        raise unreadable_error(file, error, "a log") from error
+    with reading(file, "a log"), ExitStack() as files:
+        stream = files.enter_context(file.open("rb"))
+        beside = companion_of(file)
+        companion = None if beside is None else files.enter_context(beside.open("rb"))
+        return read_takeoff(stream, name=file.name, number=takeoff, companion=companion)
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
@@ -137,11 +125,10 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
         target = out or Path(f"campaign-{campaign_id}.gainline.zip")
         arriving = target.with_name(f".{target.name}.part")
         try:
-            with arriving.open("w+b") as file:
-                write_bundle(session, campaign_id, settings.data_dir, file)
-            arriving.replace(target)
-        except OSError as error:
-            raise unwritable_error("--out", target, error) from error
+            with writing("--out", target):
+                with arriving.open("w+b") as file:
+                    write_bundle(session, campaign_id, settings.data_dir, file)
+                arriving.replace(target)
         finally:
             arriving.unlink(missing_ok=True)
     console().print(
@@ -151,13 +138,15 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
 
 def unbundle(file: Path, settings: Settings) -> None:
     """Import the campaign and print a summary. Raises InputError that names what is wrong with the file."""
-    try:
-        with _open_database(settings) as database, file.open("rb") as stream, Bundle(stream) as opened:
-            opened.check()
-            with database.write() as session:
-                made = store_bundle(session, opened, settings.data_dir)
-    except OSError as error:
-        raise unreadable_error(file, error, "a bundle") from error
+    with (
+        reading(file, "a bundle"),
+        _open_database(settings) as database,
+        file.open("rb") as stream,
+        Bundle(stream) as opened,
+    ):
+        opened.check()
+        with database.write() as session:
+            made = store_bundle(session, opened, settings.data_dir)
     out = console()
     out.print(
         f"Campaign {made.id}, {escape(made.name)}: {count(made.trials.flown, 'flight')} on {escape(made.vehicle.name)}."
@@ -198,8 +187,6 @@ def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format 
     html = render(found, chart_library(settings.ui_dir)).html
     content = print_pdf(lambda: html) if chosen == "pdf" else html.encode()
     target = out or Path(file_name(found.campaign.id, chosen))
-    try:
+    with writing("--out", target):
         target.write_bytes(content)
-    except OSError as error:
-        raise unwritable_error("--out", target, error) from error
     console().print(f"The report of campaign {found.campaign.id} was written to {escape(str(target))}.")

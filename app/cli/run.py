@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -28,6 +29,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
+from app.core.tuning.strategy import Interval
 from app.db.migrate import migrate
 from app.db.models import ProposalRow, TrialRow
 from app.db.session import Database
@@ -286,7 +288,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
         (
             f"flight {trial.number}",
             number(trial.error, 4),
-            number(trial.predicted_error if _predicts(trial, display.trials) else None, 4),
+            number(_prediction(trial, display.trials)[0], 4),
             *(f"{trial.gains[name]:g}" for name in names),
             kind,
             "best"
@@ -323,6 +325,7 @@ def _document(
     stopped_because: str,
 ) -> dict[str, object]:
     best = history.best_of(display.trials)
+    predictions = [_prediction(trial, display.trials) for trial in display.trials]
     return {
         "name": file.name,
         "vehicle": {"kind": file.vehicle.kind, "options": dict(options)},
@@ -335,22 +338,22 @@ def _document(
                 "gains": trial.gains,
                 "outcome": trial.state.value,
                 "error": trial.error,
-                "predicted_error": trial.predicted_error if _predicts(trial, display.trials) else None,
+                "predicted_error": error,
                 "reason": reason_of(trial),
-                "predicted_interval": trial.predicted_interval if _predicts(trial, display.trials) else None,
+                "predicted_interval": None if interval is None else asdict(interval),
                 "overrule_reason": trial.overrule_reason,
             }
-            for trial, kind in zip(display.trials, display.kinds, strict=True)
+            for trial, kind, (error, interval) in zip(display.trials, display.kinds, predictions, strict=True)
         ],
         "best": None if best is None else best.number,
         "stopped_because": stopped_because,
     }
 
 
-def _predicts(trial: TrialRow, trials: Sequence[TrialRow]) -> bool:
-    """Whether the trial's prediction says anything, as in the API."""
-    lower = None if trial.predicted_interval is None else trial.predicted_interval["lower"]
-    return history.is_prediction_informative(lower, trials, trial.number)
+def _prediction(trial: TrialRow, trials: Sequence[TrialRow]) -> tuple[float | None, Interval | None]:
+    """The trial's predicted error and interval, as in the API."""
+    is_corrected = history.is_corrected(trials, trial.number)
+    return history.told_prediction(trial.predicted_error, trial.predicted_interval, corrected=is_corrected)
 
 
 def _error(value: float | None, unit: str) -> str:

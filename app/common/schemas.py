@@ -74,9 +74,10 @@ Version = Annotated[int, Field(ge=1, strict=True, description="the version on wh
 
 
 class Schema(BaseModel):
-    """A part of the API; pydantic builds its validation when it is first needed, not as the program starts."""
+    """A part of the API; pydantic builds its validation when it is first needed, not as the program starts. What the
+    program sends has every field."""
 
-    model_config = ConfigDict(defer_build=True)
+    model_config = ConfigDict(defer_build=True, json_schema_serialization_defaults_required=True)
 
     @classmethod
     def view_of(cls, source: object, **fields: object) -> Self:
@@ -91,7 +92,7 @@ class Schema(BaseModel):
 class Request(Schema):
     """A request body; unknown fields are errors. Built at once: of a deferred body, pydantic warns about its alias."""
 
-    model_config = ConfigDict(defer_build=False, extra="forbid", json_schema_serialization_defaults_required=True)
+    model_config = ConfigDict(defer_build=False, extra="forbid")
 
 
 class ProblemField(Schema):
@@ -130,14 +131,6 @@ class Page(Schema, Generic[T]):
     items: list[T]
     total: int
     next_cursor: str | None
-
-
-class Interval(Schema):
-    """Interval that contains an error with probability `confidence`."""
-
-    lower: float
-    upper: float
-    confidence: float
 
 
 class Check(Schema):

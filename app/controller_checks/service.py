@@ -1,18 +1,19 @@
 """Operations on controller checks: check a recording, read the result, delete it."""
 
-from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session, undefer
 
-from app.autopilots.loop_check import FigureName, LoopCheck, Result
+from app.autopilots.loop_check import FigureName, LoopCheck, Result, SignalResult
 from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import NotFoundError, StorageError
-from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, uploaded_name
+from app.common.schemas import Gains, Page, Schema, uploaded_name
+from app.db.base import added
 from app.db.models import ControllerCheckRow
+from app.db.pages import Order, page_of
 from app.figures.base import Card, card_of
 from app.figures.panels import ControllerFigure
 from app.figures.theme import ThemeName
@@ -28,15 +29,6 @@ def get_one(session: Session, check_id: int) -> ControllerCheckRow:
     return row
 
 
-def page(session: Session, *, before_id: int | None, limit: int) -> tuple[Sequence[ControllerCheckRow], int]:
-    """The newest `limit` + 1 checks before that id, without their results, and the total count."""
-    wanted = select(ControllerCheckRow)
-    if before_id is not None:
-        wanted = wanted.where(ControllerCheckRow.id < before_id)
-    total = session.scalar(select(func.count()).select_from(ControllerCheckRow)) or 0
-    return session.scalars(wanted.order_by(ControllerCheckRow.id.desc()).limit(limit + 1)).all(), total
-
-
 class ControllerCheckSummary(Schema):
     """A recording that was compared with the replica of its autopilot's loop: `log`, of a flight, or `trace`, with
     every step."""
@@ -46,25 +38,6 @@ class ControllerCheckSummary(Schema):
     kind: Literal["log", "trace"]
     passed: bool
     checked_at: datetime
-
-
-class CheckedSignal(Schema):
-    """One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`."""
-
-    name: str
-    title: str
-    largest_difference: float
-    difference_unit: str
-    tolerance: Annotated[
-        float, Field(description="the largest difference allowed, or the largest median if there is one, same unit")
-    ]
-    allowance: Annotated[str, Field(description="description of the tolerance")]
-    verdict: Literal["exact", "agrees", "differs"]
-    different: Annotated[int, Field(description="number of samples that differ by more than the tolerance")]
-    first_different_s: float | None
-    median_difference: Annotated[
-        float | None, Field(description="decides the verdict, if it is given; else the largest difference does")
-    ]
 
 
 class CheckFigure(Schema):
@@ -84,11 +57,12 @@ class ControllerCheck(ControllerCheckSummary):
     gains_from: str
     better_gains: Annotated[Gains | None, Field(description="other gains that reproduce more of the commands")]
     notes: list[str]
-    signals: list[CheckedSignal]
+    signals: list[SignalResult]
     figures: list[CheckFigure]
 
 
 _UNNAMED: Final = "recording"
+_NEWEST_FIRST: Final = Order("-id", ControllerCheckRow.id.expression, descending=True)
 _RESULT: Final = TypeAdapter(Result)
 
 
@@ -123,18 +97,19 @@ def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
         passed=result.passed,
         result=result.as_json(),
     )
-    session.add(row)
-    session.flush()
-    return _view(row, result)
+    return _view(added(session, row), result)
 
 
 def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[ControllerCheckSummary]:
     """Page of checks, newest first."""
-    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
-    rows, total = page(session, before_id=before, limit=limit)
-    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    found = [ControllerCheckSummary.model_validate(row, from_attributes=True) for row in rows[:limit]]
-    return Page(items=found, total=total, next_cursor=following)
+    return page_of(
+        session,
+        select(ControllerCheckRow),
+        _NEWEST_FIRST,
+        cursor=cursor,
+        limit=limit,
+        view=lambda rows: [ControllerCheckSummary.view_of(row) for row in rows],
+    )
 
 
 def get_check(session: Session, check_id: int) -> ControllerCheck:
@@ -181,19 +156,11 @@ def _check(result: Result) -> LoopCheck:
 
 
 def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
-    return ControllerCheck.model_validate(
-        {
-            "id": row.id,
-            "file_name": row.file_name,
-            "checked_at": row.checked_at,
-            **{name: getattr(result, name) for name in _FROM_RESULT},
-            "autopilot": AUTOPILOTS[result.autopilot].title,
-            "figures": [{"name": name, "title": title} for name, (title, _) in _check(result).figures.items()],
-        },
-        from_attributes=True,
+    return ControllerCheck.view_of(
+        result,
+        id=row.id,
+        file_name=row.file_name,
+        checked_at=row.checked_at,
+        autopilot=AUTOPILOTS[result.autopilot].title,
+        figures=[CheckFigure(name=name, title=title) for name, (title, _) in _check(result).figures.items()],
     )
-
-
-_FROM_RESULT: Final = (
-    "kind", "passed", "sentence", "rows", "gains", "gains_from", "better_gains", "notes", "signals",
-)  # fmt: skip

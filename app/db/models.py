@@ -1,23 +1,10 @@
 """The tables. The database checks the states too; the transitions between them are in each slice's `states.py`."""
 
-from collections.abc import Iterable
 from datetime import datetime
-from enum import StrEnum
-from typing import Any, ClassVar, Final, Literal
+from typing import Final
 
-from sqlalchemy import (
-    JSON,
-    CheckConstraint,
-    Enum,
-    ForeignKey,
-    Index,
-    LargeBinary,
-    MetaData,
-    String,
-    UniqueConstraint,
-    text,
-)
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+from sqlalchemy import CheckConstraint, ForeignKey, Index, LargeBinary, String, UniqueConstraint, text
+from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from app.common.states import (
     ACTIVE_ACT_STATES,
@@ -36,64 +23,9 @@ from app.common.states import (
     VehicleState,
 )
 from app.core.tuning.strategy import Kind as ProposalKind
-from app.db.types import FlightEndJson, UtcDateTime, utc_now
+from app.db.base import NEVER_REUSE_IDS, Base, Numbered, Reported, Topic, is_one_of, state_check, state_type
+from app.db.types import GainsJson, JsonObject, OptionsJson, utc_now
 from app.vehicles.flight_end import FlightEnd
-
-Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
-JsonObject = dict[str, Any]
-GainsJson = dict[str, float]
-OptionsJson = dict[str, bool | int | float | str]
-
-NAMING: Final = {
-    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-    "ck": "ck_%(table_name)s_%(constraint_name)s",
-    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
-    "pk": "pk_%(table_name)s",
-}
-
-
-_JSON: Final = JSON(none_as_null=True)
-_NEVER_REUSE_IDS: Final = {"sqlite_autoincrement": True}
-"""Otherwise SQLite gives a deleted row's id to the next one, and an open page would show the wrong row."""
-
-
-class Base(DeclarativeBase):
-    metadata = MetaData(naming_convention=NAMING)
-    type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
-        datetime: UtcDateTime,
-        FlightEnd: FlightEndJson,
-        JsonObject: _JSON,
-        GainsJson: _JSON,
-        OptionsJson: _JSON,
-        list[str]: _JSON,
-        list[list[float]]: _JSON,
-        list[JsonObject]: _JSON,
-    }
-
-
-def _is_one_of(column: str, states: Iterable[StrEnum]) -> str:
-    return f"{column} IN ({', '.join(repr(state.value) for state in states)})"
-
-
-def _state_check(states: type[StrEnum], *, column: str = "state") -> CheckConstraint:
-    return CheckConstraint(_is_one_of(column, states), name=column)
-
-
-def _state_type(states: type[StrEnum]) -> Enum:
-    """Column type of a state, stored as text; the check is a separate constraint, so that a migration can change it."""
-    return Enum(states, native_enum=False, length=20, values_callable=lambda every: [state.value for state in every])
-
-
-class Reported:
-    """A row whose changes are published to the browsers, under its `topic`."""
-
-    topic: ClassVar[Topic]
-    id: Any
-
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        """Topic, the row's id, and the campaign that it belongs to."""
-        return self.topic, self.id, getattr(self, "campaign_id", None)
 
 
 class VehicleRow(Base, Reported):
@@ -107,16 +39,15 @@ class VehicleRow(Base, Reported):
 
     topic = "vehicle"
     __tablename__ = "vehicle"
-    __table_args__ = (_state_check(VehicleState), _NEVER_REUSE_IDS)
+    __table_args__ = (state_check(VehicleState), NEVER_REUSE_IDS)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     version: Mapped[int] = mapped_column(default=1, server_default="1")
     kind: Mapped[str] = mapped_column(index=True)
     name: Mapped[str] = mapped_column(unique=True)
     title: Mapped[str]
     is_real: Mapped[bool]
     registered: Mapped[bool] = mapped_column(default=False, server_default=text("0"))
-    state: Mapped[VehicleState] = mapped_column(_state_type(VehicleState))
+    state: Mapped[VehicleState] = mapped_column(state_type(VehicleState))
     concern: Mapped[str] = mapped_column(default="")
     options: Mapped[OptionsJson] = mapped_column(default=dict, server_default=text("'{}'"))
     identity: Mapped[JsonObject | None]
@@ -133,7 +64,7 @@ class VehicleRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-_ACT_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_ACT_STATES))
+_ACT_UNDER_WAY_SQL: Final = is_one_of("state", sorted(ACTIVE_ACT_STATES))
 
 
 class VehicleActRow(Base, Reported):
@@ -144,8 +75,8 @@ class VehicleActRow(Base, Reported):
 
     __tablename__ = "vehicle_act"
     __table_args__ = (
-        _state_check(ActState),
-        _state_check(ActKind, column="kind"),
+        state_check(ActState),
+        state_check(ActKind, column="kind"),
         Index(
             "uq_vehicle_act_vehicle_under_way",
             "vehicle_id",
@@ -153,13 +84,12 @@ class VehicleActRow(Base, Reported):
             sqlite_where=text(_ACT_UNDER_WAY_SQL),
             postgresql_where=text(_ACT_UNDER_WAY_SQL),
         ),
-        _NEVER_REUSE_IDS,
+        NEVER_REUSE_IDS,
     )
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
-    kind: Mapped[ActKind] = mapped_column(_state_type(ActKind))
-    state: Mapped[ActState] = mapped_column(_state_type(ActState))
+    kind: Mapped[ActKind] = mapped_column(state_type(ActKind))
+    state: Mapped[ActState] = mapped_column(state_type(ActState))
     by: Mapped[str] = mapped_column(default="")
     reason: Mapped[str] = mapped_column(default="")
     asked: Mapped[GainsJson | None]
@@ -187,17 +117,16 @@ class CampaignRow(Base, Reported):
 
     __tablename__ = "campaign"
     __table_args__ = (
-        _state_check(CampaignState),
-        _state_check(Outcome, column="outcome"),
+        state_check(CampaignState),
+        state_check(Outcome, column="outcome"),
         Index("ix_campaign_updated_at_id", "updated_at", "id"),
-        _NEVER_REUSE_IDS,
+        NEVER_REUSE_IDS,
     )
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     version: Mapped[int] = mapped_column(default=1)
     name: Mapped[str]
-    state: Mapped[CampaignState] = mapped_column(_state_type(CampaignState), index=True)
-    outcome: Mapped[Outcome | None] = mapped_column(_state_type(Outcome))
+    state: Mapped[CampaignState] = mapped_column(state_type(CampaignState), index=True)
+    outcome: Mapped[Outcome | None] = mapped_column(state_type(Outcome))
     stop_reason: Mapped[str] = mapped_column(default="")
     experiment: Mapped[str]
     strategy: Mapped[str]
@@ -226,13 +155,11 @@ class RehearsalRow(Base):
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
 
 
-class TrajectoryRow(Base):
+class TrajectoryRow(Base, Numbered):
     """One recorded or predicted flight, packed by `app.db.trajectories`. Written once; the database refuses changes."""
 
     __tablename__ = "trajectory"
-    __table_args__ = (_NEVER_REUSE_IDS,)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     codec: Mapped[int]
     columns: Mapped[list[str]]
     samples: Mapped[int]
@@ -257,18 +184,17 @@ class TrialRow(Base, Reported):
     topic = "trial"
     __tablename__ = "trial"
     __table_args__ = (
-        _state_check(TrialState),
+        state_check(TrialState),
         CheckConstraint("state != 'valid' OR error IS NOT NULL", name="valid_is_scored"),
         UniqueConstraint("campaign_id", "number"),
         Index("ix_trial_campaign_id_state_error", "campaign_id", "state", "error"),
-        _NEVER_REUSE_IDS,
+        NEVER_REUSE_IDS,
     )
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     version: Mapped[int] = mapped_column(default=1)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"))
     number: Mapped[int]
-    state: Mapped[TrialState] = mapped_column(_state_type(TrialState))
+    state: Mapped[TrialState] = mapped_column(state_type(TrialState))
     kind: Mapped[TrialKind] = mapped_column(String)
     gains: Mapped[GainsJson]
     read_back: Mapped[GainsJson | None]
@@ -298,6 +224,8 @@ class TrialRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     flown_at: Mapped[datetime | None]
 
+    campaign: Mapped[CampaignRow] = relationship()
+    proposal: Mapped["ProposalRow | None"] = relationship()
     trajectory: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[trajectory_id])
     predicted: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[predicted_id])
 
@@ -306,9 +234,7 @@ class TrialPhotoRow(Base, Reported):
     """A picture of a flight, as uploaded."""
 
     __tablename__ = "trial_photo"
-    __table_args__ = (_NEVER_REUSE_IDS,)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="CASCADE"), index=True)
     media_type: Mapped[str]
     data: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
@@ -325,9 +251,7 @@ class ControllerCheckRow(Base, Reported):
 
     topic = "check"
     __tablename__ = "controller_check"
-    __table_args__ = (_NEVER_REUSE_IDS,)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     file_name: Mapped[str]
     kind: Mapped[str]
     passed: Mapped[bool]
@@ -335,7 +259,7 @@ class ControllerCheckRow(Base, Reported):
     checked_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_FLIGHT_STATES))
+_UNDER_WAY_SQL: Final = is_one_of("state", sorted(ACTIVE_FLIGHT_STATES))
 
 
 class FlightRow(Base, Reported):
@@ -351,7 +275,7 @@ class FlightRow(Base, Reported):
     topic = "flight"
     __tablename__ = "flight"
     __table_args__ = (
-        _state_check(FlightState),
+        state_check(FlightState),
         Index(
             "uq_flight_vehicle_under_way",
             "vehicle_id",
@@ -359,14 +283,13 @@ class FlightRow(Base, Reported):
             sqlite_where=text(_UNDER_WAY_SQL),
             postgresql_where=text(_UNDER_WAY_SQL),
         ),
-        _NEVER_REUSE_IDS,
+        NEVER_REUSE_IDS,
     )
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="RESTRICT"), index=True)
     trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="RESTRICT"), index=True)
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
-    state: Mapped[FlightState] = mapped_column(_state_type(FlightState))
+    state: Mapped[FlightState] = mapped_column(state_type(FlightState))
     mode: Mapped[FlightMode] = mapped_column(String, default="fly", server_default="fly")
     gains: Mapped[GainsJson]
     read_back: Mapped[GainsJson | None]
@@ -385,6 +308,7 @@ class FlightRow(Base, Reported):
     claimed_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
+    campaign: Mapped[CampaignRow] = relationship()
     trial: Mapped[TrialRow] = relationship()
     vehicle: Mapped[VehicleRow] = relationship()
 
@@ -394,9 +318,7 @@ class ProposalRow(Base, Reported):
 
     topic = "proposal"
     __tablename__ = "proposal"
-    __table_args__ = (_NEVER_REUSE_IDS,)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     history_digest: Mapped[str]
     kind: Mapped[ProposalKind] = mapped_column(String)
@@ -423,11 +345,10 @@ class JobRow(Base, Reported):
 
     topic = "job"
     __tablename__ = "job"
-    __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"), _NEVER_REUSE_IDS)
+    __table_args__ = (state_check(JobState), Index("ix_job_state_id", "state", "id"), NEVER_REUSE_IDS)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     kind: Mapped[str]
-    state: Mapped[JobState] = mapped_column(_state_type(JobState))
+    state: Mapped[JobState] = mapped_column(state_type(JobState))
     campaign_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     problem: Mapped[JsonObject | None]
     order: Mapped[JsonObject | None]
@@ -442,13 +363,11 @@ class JobRow(Base, Reported):
     finished_at: Mapped[datetime | None]
 
 
-class EventRow(Base):
+class EventRow(Base, Numbered):
     """The outbox: what changed, in order."""
 
     __tablename__ = "event"
-    __table_args__ = (_NEVER_REUSE_IDS,)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     topic: Mapped[str]
     entity_id: Mapped[int]
     campaign_id: Mapped[int | None]

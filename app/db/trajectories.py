@@ -21,6 +21,7 @@ from sqlalchemy.orm import Session, defer, undefer
 from app.common.errors import StorageError
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Trajectory
+from app.db.base import added
 from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
 
@@ -153,10 +154,7 @@ def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
 
     Raises TrajectoryError when single precision cannot hold it.
     """
-    row = pack(trajectory)
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, pack(trajectory))
 
 
 _NAMED: Final = 5

@@ -10,6 +10,10 @@ from sqlalchemy.types import TypeDecorator
 
 from app.vehicles.flight_end import FlightEnd
 
+JsonObject = dict[str, Any]
+GainsJson = dict[str, float]
+OptionsJson = dict[str, bool | int | float | str]
+
 FLIGHT_END: Final = TypeAdapter(FlightEnd)
 """Reads what `asdict` made of the end of a flight."""
 

@@ -21,8 +21,9 @@ from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
 from app.core.policy import Gains
-from app.db.models import JsonObject, VehicleActRow, VehicleRow
-from app.db.types import utc_now
+from app.db.base import added
+from app.db.models import VehicleActRow, VehicleRow
+from app.db.types import JsonObject, utc_now
 from app.fleet import repository
 from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import Vehicle, VehicleAct
@@ -118,9 +119,7 @@ def _add(session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: s
         reason=reason,
         asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
     )
-    session.add(act)
-    session.flush()
-    return act
+    return added(session, act)
 
 
 def claim_act(session: Session, worker: str) -> ActTask | None:

@@ -15,8 +15,9 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import STAGED_BY_SCRIPT, Permission, RequestContext, is_allowed, require
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import ActKind, ActState
-from app.db.models import JsonObject, VehicleActRow, VehicleRow
-from app.db.types import utc_now
+from app.db.base import added
+from app.db.models import VehicleActRow, VehicleRow
+from app.db.types import JsonObject, utc_now
 from app.fleet import repository
 from app.fleet.schemas import Control, Lease, LeaseRequest
 
@@ -157,9 +158,7 @@ def record_act(
         requested_at=now,
         finished_at=now,
     )
-    session.add(act)
-    session.flush()
-    return act
+    return added(session, act)
 
 
 def _granted(session: Session, row: VehicleRow, operator: str, token: str) -> Lease:

@@ -18,6 +18,7 @@ from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
 from app.core.errors import GainlineError
 from app.core.formatting import EXACT_DIGITS, format_gains, setting_text
 from app.core.policy import PolicySpace
+from app.db.base import added
 from app.db.models import VehicleRow
 from app.fleet import repository
 from app.fleet.control import record_act, require_may_command, require_not_controlled_by_other
@@ -69,8 +70,7 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
         safe_gains=gains,
         state=VehicleState.DISCONNECTED,
     )
-    session.add(row)
-    session.flush()
+    added(session, row)
     record_act(session, row, ActKind.SAFE_GAINS, by="", reason=new.statement or "registered", asked=gains)
     return vehicle_view(row)
 
@@ -319,9 +319,7 @@ def get_or_create_imported_vehicle(
                 safe_gains=dict(safe_gains),
                 state=VehicleState.DISCONNECTED,
             )
-            session.add(row)
-            session.flush()
-            return row
+            return added(session, row)
         if (known.kind, known.registered, known.is_real, known.options) == (IMPORT.name, False, is_real, origin):
             return known
     raise AssertionError("unreachable")

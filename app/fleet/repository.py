@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Final
 
-from sqlalchemy import ColumnElement, String, and_, delete, func, literal, null, or_, select, tuple_, union_all
+from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, tuple_, union_all
 from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
@@ -24,6 +24,8 @@ from app.db.types import UtcDateTime
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 Line = tuple[str, int]
 """A line of the ledger: its purpose and the id of its flight or act."""
+
+EVERY_VEHICLE: Final = select(VehicleRow)
 
 
 def get_one(session: Session, vehicle_id: int) -> VehicleRow:
@@ -46,13 +48,6 @@ def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
 def of_name_or_none(session: Session, name: str) -> VehicleRow | None:
     """The vehicle of that name, ignoring case."""
     return session.scalar(select(VehicleRow).where(func.lower(VehicleRow.name) == name.lower()).limit(1))
-
-
-def page(session: Session, *, after_id: int, limit: int) -> tuple[Sequence[VehicleRow], int]:
-    """The next `limit` + 1 vehicles after that id, and the total count."""
-    total = session.scalar(select(func.count(VehicleRow.id))) or 0
-    wanted = select(VehicleRow).where(VehicleRow.id > after_id).order_by(VehicleRow.id).limit(limit + 1)
-    return session.scalars(wanted).all(), total
 
 
 def registered_in(session: Session, *states: VehicleState) -> Sequence[VehicleRow]:
@@ -89,15 +84,8 @@ def first_requested_act(session: Session) -> VehicleActRow | None:
     return session.scalar(wanted.order_by(VehicleActRow.id).limit(1))
 
 
-def acts(
-    session: Session, vehicle_id: int, *, before_id: int | None, limit: int
-) -> tuple[Sequence[VehicleActRow], int]:
-    """The newest `limit` + 1 acts before that id, and the total count."""
-    wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
-    total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
-    if before_id is not None:
-        wanted = wanted.where(VehicleActRow.id < before_id)
-    return session.scalars(wanted.order_by(VehicleActRow.id.desc()).limit(limit + 1)).all(), total
+def acts_wanted(vehicle_id: int) -> Select[VehicleActRow]:
+    return select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
 
 
 def ledger(

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from app.common.schemas import Gains, Name, Number, OptionValue, Reason, Request, Schema, Shown, Version
 from app.common.states import ActKind, ActState, VehicleState
+from app.vehicles.base import CheckItem, Identity
 
 OrderReason = Annotated[str, Field(max_length=500)]
 Battery = Annotated[str, Field(max_length=60), Shown]
@@ -63,26 +64,6 @@ class VehicleEdit(Request):
     statement: Reason | None = None
 
 
-class Identity(Schema):
-    """Identity that the vehicle reports over its link; pinned at the first connection without a concern."""
-
-    system_id: int
-    autopilot: str
-    version: Annotated[str, Field(description="empty if the autopilot does not report it")]
-    uid: Annotated[str, Field(description="hardware id in hexadecimal digits; empty if it is not reported")] = ""
-
-
-class VehicleCheck(Schema):
-    """One item of the preflight check."""
-
-    name: str
-    title: str
-    passed: bool
-    found: str
-    needed: str
-    hint: str = ""
-
-
 class Control(Schema):
     """The operator in control. Renewals are not published as events: load it again after `until` to see whether it has
     ended."""
@@ -127,7 +108,7 @@ class Vehicle(Schema):
     safe_gains: Gains
     held: Gains | None
     held_at: datetime | None
-    checks: list[VehicleCheck] | None
+    checks: list[CheckItem] | None
     checked_at: datetime | None
     battery: Annotated[str, Field(description="label of the installed battery; empty if not given")]
     control: Annotated[Control | None, Field(description="null while no operator is in control")]

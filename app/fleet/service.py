@@ -12,10 +12,12 @@ from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import BusyError, ConflictError, InputError, Problem
-from app.common.schemas import Page, decode_cursor, encode_cursor
+from app.common.schemas import Page
 from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, VehicleState
 from app.core.policy import Gains
+from app.db.base import added
 from app.db.models import VehicleRow
+from app.db.pages import Order, page_of
 from app.db.types import utc_now
 from app.fleet import repository
 from app.fleet.schemas import Vehicle, VehicleChoice
@@ -57,9 +59,7 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         safe_gains=dict(default_gains),
         state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
     )
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, row)
 
 
 def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, default_gains: Gains) -> VehicleRow:
@@ -214,10 +214,15 @@ def is_classed_automatically(row: VehicleRow) -> bool:
 
 def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[Vehicle]:
     """Page of vehicles in the order in which they were registered or first used."""
-    after = 0 if cursor is None else decode_cursor("id", cursor, float)[1]
-    rows, total = repository.page(session, after_id=after, limit=limit)
-    following = encode_cursor("id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    return Page(items=[vehicle_view(row) for row in rows[:limit]], total=total, next_cursor=following)
+    order = Order("id", VehicleRow.id.expression)
+    return page_of(
+        session,
+        repository.EVERY_VEHICLE,
+        order,
+        cursor=cursor,
+        limit=limit,
+        view=lambda rows: [vehicle_view(row) for row in rows],
+    )
 
 
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:

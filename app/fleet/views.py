@@ -1,5 +1,7 @@
 """API views of vehicles, their acts and their gain history; what a vehicle can do, by its kind."""
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -19,9 +21,10 @@ from app.common.states import (
     VehicleState,
 )
 from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
+from app.db.pages import Order, page_of
 from app.fleet import repository
 from app.fleet.control import control_of
-from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
+from app.fleet.schemas import CampaignVehicle, GivenGains, Vehicle, VehicleAct
 from app.vehicles.end_texts import end_text
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS
@@ -65,26 +68,11 @@ _NEWEST_FIRST: Final = "-at"
 
 
 def vehicle_view(row: VehicleRow) -> Vehicle:
-    return Vehicle(
-        id=row.id,
-        version=row.version,
-        kind=row.kind,
-        name=row.name,
-        title=row.title,
-        is_real=row.is_real,
+    return Vehicle.view_of(
+        row,
         can_fly=can_fly(row),
-        registered=row.registered,
-        state=row.state,
-        concern=row.concern,
         experiments=experiments_of(row),
         options=settings_of(row) if row.registered else row.options,
-        identity=None if row.identity is None else Identity.model_validate(row.identity),
-        safe_gains=row.safe_gains,
-        held=row.held,
-        held_at=row.held_at,
-        checks=None if row.checks is None else [VehicleCheck.model_validate(check) for check in row.checks],
-        checked_at=row.checked_at,
-        battery=row.battery,
         control=control_of(row),
         actions=_actions(row),
     )
@@ -93,17 +81,8 @@ def vehicle_view(row: VehicleRow) -> Vehicle:
 def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
     """A campaign's vehicle with its settings."""
     vehicle = row.vehicle
-    return CampaignVehicle(
-        id=vehicle.id,
-        kind=vehicle.kind,
-        name=vehicle.name,
-        title=vehicle.title,
-        is_real=vehicle.is_real,
-        registered=vehicle.registered,
-        can_fly=can_fly(vehicle),
-        needs_staging=needs_staging(vehicle),
-        state=vehicle.state,
-        options=options_of(row),
+    return CampaignVehicle.view_of(
+        vehicle, can_fly=can_fly(vehicle), needs_staging=needs_staging(vehicle), options=options_of(row)
     )
 
 
@@ -148,13 +127,15 @@ def _flight_id(row: VehicleActRow) -> int | None:
 def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
     """Page of acts, newest first. Raises NotFoundError."""
     repository.get_one(session, vehicle_id)
-    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
-    rows, total = repository.acts(session, vehicle_id, before_id=before, limit=limit)
-    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    of_flights = {row.id: flight_id for row in rows[:limit] if (flight_id := _flight_id(row)) is not None}
+    order = Order("-id", VehicleActRow.id.expression, descending=True)
+    wanted, view = repository.acts_wanted(vehicle_id), partial(_act_views, session)
+    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=view)
+
+
+def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleAct]:
+    of_flights = {row.id: flight_id for row in rows if (flight_id := _flight_id(row)) is not None}
     flights = repository.flights_by_id(session, list(of_flights.values()))
-    items = [act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows[:limit]]
-    return Page(items=items, total=total, next_cursor=following)
+    return [act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
 
 
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
@@ -197,14 +178,12 @@ def _actions(row: VehicleRow) -> list[str]:
 
 
 def _of_flight(row: FlightRow) -> GivenGains:
-    return GivenGains(
+    return GivenGains.view_of(
+        row,
         purpose="flight",
         flight_id=row.id,
-        campaign_id=row.campaign_id,
-        trial_id=row.trial_id,
         act_id=None,
         asked=row.gains,
-        read_back=row.read_back,
         outcome="record invalid" if row.state == FlightState.LANDED and row.trial.ending == "invalid" else row.state,
         asked_at=row.claimed_at,
     )
@@ -212,11 +191,10 @@ def _of_flight(row: FlightRow) -> GivenGains:
 
 def _of_restoring(vehicle: VehicleRow, row: FlightRow) -> GivenGains:
     asked = row.safe_gains if row.safe_gains is not None else vehicle.safe_gains
-    return GivenGains(
-        purpose="restore after flight",
+    return GivenGains.view_of(
+        row,
+        purpose=repository.RESTORE_AFTER_FLIGHT,
         flight_id=row.id,
-        campaign_id=row.campaign_id,
-        trial_id=row.trial_id,
         act_id=None,
         asked=asked,
         read_back=row.restored,
@@ -226,16 +204,14 @@ def _of_restoring(vehicle: VehicleRow, row: FlightRow) -> GivenGains:
 
 
 def _of_act(row: VehicleActRow) -> GivenGains:
-    return GivenGains.model_validate(
-        {
-            "purpose": row.kind.value,
-            "flight_id": None,
-            "campaign_id": None,
-            "trial_id": None,
-            "act_id": row.id,
-            "asked": row.asked or {},
-            "read_back": row.read_back,
-            "outcome": row.state.value,
-            "asked_at": row.claimed_at,
-        }
+    return GivenGains.view_of(
+        row,
+        purpose=row.kind.value,
+        flight_id=None,
+        campaign_id=None,
+        trial_id=None,
+        act_id=row.id,
+        asked=row.asked or {},
+        outcome=row.state.value,
+        asked_at=row.claimed_at,
     )

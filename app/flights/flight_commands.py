@@ -3,24 +3,21 @@
 from sqlalchemy.orm import Session
 
 from app.campaigns import history
-from app.campaigns import service as campaigns
 from app.common.states import ActKind
-from app.db.models import CampaignRow, FlightRow
+from app.db.models import FlightRow
 from app.fleet.control import record_act
 from app.vehicles.end_texts import request_text
 from app.vehicles.flight_end import StopRequest
 
 
-def record_flight_command(
-    session: Session, campaign: CampaignRow, flight: FlightRow, kind: ActKind, *, by: str, reason: str = ""
-) -> None:
+def record_flight_command(session: Session, flight: FlightRow, kind: ActKind, *, by: str, reason: str = "") -> None:
     """Record a command to the vehicle of a flight, which has its outcome; `by` is the operator in control, empty if the
     request came from elsewhere. Shared simulations have no log."""
-    if campaign.vehicle.registered:
-        named = f"flight {flight.trial.number} of {campaign.name}"
+    if flight.vehicle.registered:
+        named = f"flight {flight.trial.number} of {flight.campaign.name}"
         record_act(
             session,
-            campaign.vehicle,
+            flight.vehicle,
             kind,
             by=by,
             reason=f"{named}: {reason}" if reason else named,
@@ -30,7 +27,6 @@ def record_flight_command(
 
 def record_abort(session: Session, trial_id: int, request: StopRequest) -> None:
     """Record an abort, which everyone may request. Raises NotFoundError."""
-    trial = history.trial_row(session, trial_id)
-    campaign = campaigns.get_row(session, trial.campaign_id)
+    history.trial_row(session, trial_id)
     if (flight := history.latest_flights(session, [trial_id]).get(trial_id)) is not None:
-        record_flight_command(session, campaign, flight, ActKind.ABORT, by="", reason=request_text(request))
+        record_flight_command(session, flight, ActKind.ABORT, by="", reason=request_text(request))

@@ -24,7 +24,7 @@ from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import FlightState, TrialState, VehicleState
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
-from app.db.models import CampaignRow, FlightRow
+from app.db.models import FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.flights.process_messages import FlightRequest
@@ -89,33 +89,30 @@ def withdrawn_outcome(request: StopRequest) -> FlightOutcome:
 
 
 _WITH_ALL: Final = (
-    select(FlightRow, CampaignRow)
-    .join(CampaignRow, CampaignRow.id == FlightRow.campaign_id)
-    .options(joinedload(FlightRow.trial, innerjoin=True), joinedload(FlightRow.vehicle, innerjoin=True))
+    select(FlightRow)
+    .options(*(joinedload(of, innerjoin=True) for of in (FlightRow.campaign, FlightRow.trial, FlightRow.vehicle)))
     .order_by(FlightRow.id)
 )
 """Flights with their trials, vehicles and campaigns."""
 
 
-def _read(session: Session, flight_id: int) -> tuple[FlightRow, CampaignRow]:
-    if (found := session.execute(_WITH_ALL.where(FlightRow.id == flight_id)).one_or_none()) is None:
+def _read(session: Session, flight_id: int) -> FlightRow:
+    if (flight := session.scalar(_WITH_ALL.where(FlightRow.id == flight_id))) is None:
         raise NotFoundError("flight", flight_id)
-    flight, campaign = found
-    return flight, campaign
+    return flight
 
 
-def _read_running(session: Session, flight_id: int) -> tuple[FlightRow, CampaignRow]:
-    flight, campaign = _read(session, flight_id)
+def _read_running(session: Session, flight_id: int) -> FlightRow:
+    flight = _read(session, flight_id)
     if flight.state != FlightState.RUNNING:
         raise ConflictError(
             f"Flight {flight_id} is {flight.state}, not running.", hint="It cannot continue. Reload the trial."
         )
-    return flight, campaign
+    return flight
 
 
-def _first_requested(session: Session) -> tuple[FlightRow, CampaignRow] | None:
-    found = session.execute(_WITH_ALL.where(FlightRow.state == FlightState.REQUESTED).limit(1)).one_or_none()
-    return None if found is None else (found[0], found[1])
+def _first_requested(session: Session) -> FlightRow | None:
+    return session.scalar(_WITH_ALL.where(FlightRow.state == FlightState.REQUESTED).limit(1))
 
 
 def claim_flight(session: Session, worker: str) -> FlightRequest | None:
@@ -123,10 +120,9 @@ def claim_flight(session: Session, worker: str) -> FlightRequest | None:
 
     A flight must begin when its operator expects it: a request older than REQUEST_TIMEOUT is withdrawn.
     """
-    while (found := _first_requested(session)) is not None:
-        flight, campaign = found
+    while (flight := _first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
-            return _claimed(flight, campaign, worker)
+            return _claimed(flight, worker)
         _withdraw(flight, f"it could not be started within {REQUEST_TIMEOUT.total_seconds():g} s")
     return None
 
@@ -135,8 +131,7 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
     """Withdraw all requested flights at a worker's start, because nothing may take off that was requested while no
     worker ran. Returns their ids."""
     withdrawn: list[int] = []
-    while (found := _first_requested(session)) is not None:
-        flight, _ = found
+    while (flight := _first_requested(session)) is not None:
         _withdraw(flight, reason)
         withdrawn.append(flight.id)
     return withdrawn
@@ -150,19 +145,19 @@ def _withdraw(flight: FlightRow, reason: str) -> None:
     )
 
 
-def _claimed(flight: FlightRow, campaign: CampaignRow, worker: str) -> FlightRequest:
+def _claimed(flight: FlightRow, worker: str) -> FlightRequest:
     set_flight_state(flight, FlightState.RUNNING)
     flight.worker, flight.claimed_at = worker, utc_now()
     flight.safe_gains = dict(flight.vehicle.safe_gains)
     return FlightRequest(
         flight_id=flight.id,
         trial_id=flight.trial_id,
-        campaign_id=campaign.id,
-        experiment=campaign.experiment,
-        experiment_options=campaign.definition["experiment_options"],
+        campaign_id=flight.campaign_id,
+        experiment=flight.campaign.experiment,
+        experiment_options=flight.campaign.definition["experiment_options"],
         vehicle_id=flight.vehicle_id,
         vehicle_kind=flight.vehicle.kind,
-        vehicle_options=fleet.options_of(campaign),
+        vehicle_options=fleet.options_of(flight.campaign),
         safe_gains=dict(flight.safe_gains),
         gains=dict(flight.gains),
         seed=flight.trial.seed,
@@ -173,7 +168,7 @@ def _claimed(flight: FlightRow, campaign: CampaignRow, worker: str) -> FlightReq
 
 def record_staged(session: Session, flight_id: int, read_back: dict[str, float]) -> None:
     """Record the gains that the vehicle read back. Raises ConflictError when the trial was cancelled."""
-    flight, _ = _read_running(session, flight_id)
+    flight = _read_running(session, flight_id)
     flight.read_back = flight.trial.read_back = read_back
     fleet.hold_gains(flight.vehicle, read_back)
     set_trial_state(flight.trial, TrialState.STAGED)
@@ -188,8 +183,7 @@ def clearance_of(session: Session, flight_id: int) -> tuple[bool, FlightOutcome 
     operator expects. It must not when it was unstaged, its trial was cancelled, or the takeoff could not begin in
     time; the worker then restores the safe gains and records the flight as withdrawn for this reason.
     """
-    flight, _ = _read(session, flight_id)
-    return _clearance(flight)
+    return _clearance(_read(session, flight_id))
 
 
 def _clearance(flight: FlightRow) -> tuple[bool, FlightOutcome | None]:
@@ -224,7 +218,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     the trial was cancelled or unstaged, when the gains read back are not the trial's, or when the operator of a staged
     flight has not requested the takeoff.
     """
-    flight, campaign = _read_running(session, flight_id)
+    flight = _read_running(session, flight_id)
     trial = flight.trial
     may_take_off, stands_down = _clearance(flight)
     if not may_take_off:
@@ -242,7 +236,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     set_trial_state(trial, TrialState.FLYING, reason="")
     trial.end, trial.flown_at = None, utc_now()
     fleet.set_vehicle_state(flight.vehicle, VehicleState.FLYING)
-    proposals.start_flying(campaign)
+    proposals.start_flying(flight.campaign)
 
 
 def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> None:
@@ -253,16 +247,16 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     vehicle whose safe gains could not be verified stays grounded until a person releases it. Raises TrajectoryError
     when the record cannot be stored.
     """
-    flight, campaign = _read(session, flight_id)
+    flight = _read(session, flight_id)
     end = outcome.gains_left(outcome.ended if flight.end is None else flight.end, flight.safe_gains)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
-            _land(session, campaign, flight, replace(outcome.record, end=end))
+            _land(session, flight, replace(outcome.record, end=end))
         elif outcome.lifted_off:
-            _lose(session, campaign, flight, end)
+            _lose(session, flight, end)
         else:
             state = FlightState.CANCELLED if outcome.withdrawn else FlightState.FAILED
-            _end_unflown(session, campaign, flight, state, end)
+            _end_unflown(session, flight, state, end)
     flight.end = end
     if outcome.restored is not None:
         flight.restored, flight.restored_at = dict(outcome.restored), utc_now()
@@ -272,8 +266,8 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
 
 def give_up_flight(session: Session, flight_id: int, outcome: FlightOutcome, problem: str) -> None:
     """End a flight whose outcome cannot be stored: lost if it had lifted off, else not flown."""
-    flight, campaign = _read(session, flight_id)
-    _give_up(session, campaign, flight, problem)
+    flight = _read(session, flight_id)
+    _give_up(session, flight, problem)
     _record_doubts(flight, outcome)
 
 
@@ -284,8 +278,8 @@ def lose_running_flights(session: Session) -> list[int]:
     """
     return [
         flight.trial_id
-        for flight, campaign in session.execute(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all()
-        if _give_up(session, campaign, flight, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
+        for flight in session.scalars(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all()
+        if _give_up(session, flight, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
     ]
 
 
@@ -294,48 +288,46 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
 
     Raises TrajectoryError when it cannot be stored.
     """
-    flight, campaign = _read(session, flight_id)
+    flight = _read(session, flight_id)
     if flight.trial.state != TrialState.LOST:
         return
-    _capture(session, campaign, flight, record)
-    proposals.history_changed(session, campaign)
+    _capture(session, flight, record)
+    proposals.history_changed(session, flight.campaign)
 
 
-def _land(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
-    _capture(session, campaign, flight, record)
+def _land(session: Session, flight: FlightRow, record: FlightRecord) -> None:
+    _capture(session, flight, record)
     _end(flight, FlightState.ABORTED if record.ending == "aborted" else FlightState.LANDED, record.end)
-    proposals.finish_flying(session, campaign)
+    proposals.finish_flying(session, flight.campaign)
 
 
-def _lose(session: Session, campaign: CampaignRow, flight: FlightRow, end: FlightEnd) -> None:
+def _lose(session: Session, flight: FlightRow, end: FlightEnd) -> None:
     """Record that it is unknown how the flight ended."""
     set_trial_state(flight.trial, TrialState.LOST, reason="")
     flight.trial.end = end
     _end(flight, FlightState.LOST, end)
     _doubt_vehicle(flight)
-    proposals.finish_flying(session, campaign)
+    proposals.finish_flying(session, flight.campaign)
 
 
-def _end_unflown(
-    session: Session, campaign: CampaignRow, flight: FlightRow, state: FlightState, end: FlightEnd
-) -> None:
+def _end_unflown(session: Session, flight: FlightRow, state: FlightState, end: FlightEnd) -> None:
     was_flying = flight.trial.state == TrialState.FLYING
     if flight.trial.state in {TrialState.STAGED, TrialState.FLYING}:
         set_trial_state(flight.trial, TrialState.PLANNED, reason="")
         flight.trial.end, flight.trial.flown_at = end, None
     _end(flight, state, end)
     if was_flying:
-        proposals.finish_flying(session, campaign)
+        proposals.finish_flying(session, flight.campaign)
 
 
-def _give_up(session: Session, campaign: CampaignRow, flight: FlightRow, problem: str) -> bool:
+def _give_up(session: Session, flight: FlightRow, problem: str) -> bool:
     """End a flight that no more messages will come from. Returns whether it is lost."""
     lifted_off = flight.trial.state == TrialState.FLYING
     if flight.state == FlightState.RUNNING:
         if lifted_off:
-            _lose(session, campaign, flight, FlightEnd(remarks=(problem,), landed=Landing.UNKNOWN))
+            _lose(session, flight, FlightEnd(remarks=(problem,), landed=Landing.UNKNOWN))
         else:
-            _end_unflown(session, campaign, flight, FlightState.FAILED, not_begun(problem))
+            _end_unflown(session, flight, FlightState.FAILED, not_begun(problem))
     _doubt_vehicle(flight)
     return lifted_off
 
@@ -356,8 +348,8 @@ def _doubt_vehicle(flight: FlightRow) -> None:
         fleet.doubt_gains(flight.vehicle)
 
 
-def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
-    capture(session, campaign, flight.trial, record.trajectory, ending=record.ending, end=record.end)
+def _capture(session: Session, flight: FlightRow, record: FlightRecord) -> None:
+    capture(session, flight.trial, record.trajectory, ending=record.ending, end=record.end)
     flight.trial.settings = dict(record.settings)
     flight.battery_v_before = starting_battery_v(record.trajectory)
     flight.battery_v_after = landing_battery_v(record.trajectory)

@@ -5,15 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from app.common.schemas import Schema
-from app.flights.readiness import LossKind, ReadinessStep
-
-
-class ReadinessLoss(Schema):
-    """A reason why readiness is lost: what it means now, and what to do."""
-
-    kind: LossKind
-    what: str
-    way_on: str
+from app.flights.readiness import Loss, ReadinessStep
 
 
 class TrialReadiness(Schema):
@@ -21,5 +13,5 @@ class TrialReadiness(Schema):
 
     steps: list[ReadinessStep]
     lost: list[ReadinessStep]
-    losses: Annotated[list[ReadinessLoss], Field(description="why; the takeoff is refused while there is any")]
+    losses: Annotated[list[Loss], Field(description="why; the takeoff is refused while there is any")]
     is_ready: Annotated[bool, Field(description="whether the takeoff of the staged vehicle may be requested")]

@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, RequestContext, RequestOrigin
 from app.campaigns import history, rehearsals
-from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_flight_state
 from app.campaigns.trials import service as trials
@@ -27,7 +26,8 @@ from app.common.states import (
     TrialState,
 )
 from app.core.errors import GainlineError
-from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleRow
+from app.db.base import added
+from app.db.models import FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import (
@@ -54,7 +54,7 @@ def warm_gate_cache(session: Session, trial_id: int) -> None:
     """Run the gate's simulations before the transaction of `fly_trial` or `stage_trial` needs the results."""
     with suppress(GainlineError):
         row = history.trial_row(session, trial_id)
-        check_own_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
+        check_own_gains(session, row.campaign, row.gains)
 
 
 def plan_trial(
@@ -69,9 +69,9 @@ def plan_trial(
     trial = trials.create_trial(session, campaign_id, new, context, predict=predict)
     if new.fly is None:
         return trial
-    campaign, row = campaigns.get_row(session, campaign_id), history.trial_row(session, trial.id)
-    request_flight(session, campaign, row, context, speed=new.fly.speed)
-    return trial_view(session, campaign, row)
+    row = history.trial_row(session, trial.id)
+    request_flight(session, row, context, speed=new.fly.speed)
+    return trial_view(session, row)
 
 
 def fly_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext) -> Trial:
@@ -98,17 +98,15 @@ def _request_trial_flight(
 ) -> Trial:
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, mode, row.state, f"Flight {row.number}")
-    campaign = campaigns.get_row(session, row.campaign_id)
-    trials.require_open(session, campaign, HISTORY_TRIAL_STATES)
-    judged = check_own_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
+    trials.require_open(session, row.campaign, HISTORY_TRIAL_STATES)
+    judged = check_own_gains(session, row.campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
-    request_flight(session, campaign, row, context, mode=mode, speed=speed)
-    return trial_view(session, campaign, row)
+    request_flight(session, row, context, mode=mode, speed=speed)
+    return trial_view(session, row)
 
 
 def request_flight(
     session: Session,
-    campaign: CampaignRow,
     row: TrialRow,
     context: RequestContext,
     *,
@@ -116,7 +114,7 @@ def request_flight(
     speed: float | None = None,
 ) -> None:
     """Add the flight row that the worker claims. Raises as `fly_trial` does."""
-    vehicle = campaign.vehicle
+    campaign, vehicle = row.campaign, row.campaign.vehicle
     if mode == "stage" and not vehicle.registered:
         raise ConflictError(
             f"{vehicle.name} is flown without staging.", hint="Fly it directly; only registered vehicles are staged."
@@ -144,20 +142,18 @@ def request_flight(
         requested_at=now,
         take_off_at=now if mode == "fly" else None,
     )
-    session.add(flight)
-    session.flush()
-    record_flight_command(session, campaign, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
+    added(session, flight)
+    record_flight_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
     """How far the flight of a trial has come and what takes that back, for who asks. Raises NotFoundError."""
     row = history.trial_row(session, trial_id)
-    readiness = _readiness(session, row, context, report_of)
-    return TrialReadiness.model_validate(readiness, from_attributes=True)
+    return TrialReadiness.view_of(_readiness(session, row, context, report_of))
 
 
 def _readiness(session: Session, row: TrialRow, context: RequestContext, report_of: ReportOf) -> Readiness:
-    vehicle = campaigns.get_row(session, row.campaign_id).vehicle
+    vehicle = row.campaign.vehicle
     flight = history.latest_flights(session, [row.id]).get(row.id)
     active = flight if flight is not None and flight.state in ACTIVE_FLIGHT_STATES else None
     has_control = is_in_control(vehicle, context)
@@ -197,20 +193,20 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
     """
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "take-off", row.state, f"Flight {row.number}")
-    campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
+    flight = _staged(session, row)
     if flight.take_off_at is not None:
         raise ConflictError(f"The takeoff of trial {row.number} has already been requested.", hint="Watch the flight.")
-    vehicle = campaign.vehicle
+    vehicle = flight.vehicle
     if fleet.needs_staging(vehicle):
         by = require_control(vehicle, context)
-        rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may be reclassified while staged
+        rehearsals.require_rehearsed(session, row.campaign)  # again: a flight of it may be reclassified while staged
     else:
         require_may_command(vehicle, context)
         by = require_not_controlled_by_other(vehicle, context)
     require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
-    record_flight_command(session, campaign, flight, ActKind.TAKE_OFF, by=by)
-    return trial_view(session, campaign, row)
+    record_flight_command(session, flight, ActKind.TAKE_OFF, by=by)
+    return trial_view(session, row)
 
 
 def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOCAL_CLI) -> Trial:
@@ -221,16 +217,13 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     """
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "unstage", row.state, f"Flight {row.number}")
-    campaign = campaigns.get_row(session, row.campaign_id)
-    requester = _requester(campaign.vehicle, context)
+    requester = _requester(row.campaign.vehicle, context)
     flight = _staged(session, row)
     flight.stand_down = requester
-    operator = control_of(campaign.vehicle) if is_in_control(campaign.vehicle, context) else None
+    operator = control_of(flight.vehicle) if is_in_control(flight.vehicle, context) else None
     by = "" if operator is None else operator.operator
-    record_flight_command(
-        session, campaign, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester)
-    )
-    return trial_view(session, campaign, row)
+    record_flight_command(session, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester))
+    return trial_view(session, row)
 
 
 def _requester(vehicle: VehicleRow, context: RequestContext) -> Requester:

@@ -7,21 +7,24 @@ For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it co
 
 from collections.abc import Collection, Sequence
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
 from pydantic import Field
-from sqlalchemy import ColumnElement, Select, func, select, update
+from sqlalchemy import ColumnElement, Select, select, update
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
 from app.common.errors import NotFoundError
-from app.common.logging import lines_of_job
-from app.common.schemas import Page, Schema, Trouble, decode_cursor, encode_cursor
+from app.common.logging import LogLine, lines_of_job
+from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
-from app.db.models import CampaignRow, JobRow, JsonObject
-from app.db.types import utc_now
+from app.db.base import added
+from app.db.models import CampaignRow, JobRow
+from app.db.pages import Order, page_of
+from app.db.types import JsonObject, utc_now
 
 
 class Job(Schema):
@@ -44,20 +47,10 @@ class Job(Schema):
     actions: Annotated[list[str], Field(description="allowed actions: cancel, retry")]
 
 
-class JobLogLine(Schema):
-    """A line of the worker's log about a job. `exception` is a traceback, empty without one."""
-
-    at: datetime
-    level: str
-    message: str
-    details: dict[str, str]
-    exception: str
-
-
 class JobLog(Schema):
     """The last lines about a job, oldest first; `total` counts all that are kept."""
 
-    lines: list[JobLogLine]
+    lines: list[LogLine]
     total: int
 
 
@@ -67,6 +60,8 @@ LEAST_PACE_SHARE: Final = 0.1
 
 MAX_ATTEMPTS: Final = 3
 """A job that lost its worker this many times has probably killed it, and is failed."""
+
+_NEWEST_FIRST: Final = Order("-id", JobRow.id.expression, descending=True)
 
 
 class SupersededError(GainlineError):
@@ -84,10 +79,7 @@ def enqueue_job(
         same = _newest(kind).where(JobRow.campaign_id == campaign_id, JobRow.state == JobState.QUEUED)
         if (waiting := session.scalar(same)) is not None:
             return waiting
-    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, order=order)
-    session.add(row)
-    session.flush()
-    return row
+    return added(session, JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, order=order))
 
 
 def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s: float) -> JobRow | None:
@@ -203,18 +195,12 @@ def list_jobs(
     session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int, cursor: str | None
 ) -> Page[Job]:
     """Page of jobs, newest first."""
-    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     wanted = select(JobRow)
     if states:
         wanted = wanted.where(JobRow.state.in_(states))
     if campaign_id is not None:
         wanted = wanted.where(JobRow.campaign_id == campaign_id)
-    total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
-    if before is not None:
-        wanted = wanted.where(JobRow.id < before)
-    rows = session.scalars(wanted.order_by(JobRow.id.desc()).limit(limit + 1)).all()
-    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    return Page(items=job_views(session, rows[:limit]), total=total, next_cursor=following)
+    return page_of(session, wanted, _NEWEST_FIRST, cursor=cursor, limit=limit, view=partial(job_views, session))
 
 
 def get_job(session: Session, job_id: int) -> Job:
@@ -225,7 +211,7 @@ def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> Job
     """Log lines of a job. Raises NotFoundError."""
     row = _one(session, job_id)
     lines, total = lines_of_job(data_dir, job_id, since=row.created_at, limit=limit)
-    return JobLog.model_validate({"lines": lines, "total": total}, from_attributes=True)
+    return JobLog(lines=lines, total=total)
 
 
 def cancel_job(session: Session, job_id: int) -> Job:

@@ -16,8 +16,8 @@ from markupsafe import Markup
 from app.campaigns.schemas import Campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.conflict_checks import state_label
-from app.common.schemas import Interval
 from app.core import formatting
+from app.core.tuning.strategy import Interval
 from app.figures.base import Card, Cell, Column
 from app.reports.sections import Photo, Report
 

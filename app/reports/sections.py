@@ -11,7 +11,8 @@ from sqlalchemy.orm import Session
 
 from app.autopilots.experiments import EXPERIMENTS
 from app.campaigns.history import FLOWN
-from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
+from app.campaigns.schemas import Campaign, Start, StopRule
+from app.campaigns.statistics import CampaignStatistics
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
@@ -23,7 +24,8 @@ from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow
 from app.figures.base import Card
-from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
+from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
+from app.vehicles.base import Identity
 from app.vehicles.end_texts import cause_text
 from app.vehicles.flight_end import FlightEnd
 from app.vehicles.registry import VEHICLE_KINDS

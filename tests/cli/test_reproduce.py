@@ -2,11 +2,13 @@
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from typer.testing import CliRunner, Result
 
-from app.cli.commands import Reproducible, app
+from app.cli.commands import app
+from app.cli.options import Reproducible
 from app.reproductions.registry import REPRODUCTIONS
 
 TRACES = Path(__file__).parents[1] / "data" / "vertical_loop"
@@ -17,7 +19,7 @@ def reproduce(*arguments: str | Path) -> Result:
 
 
 def test_every_reproduction_can_be_asked_for_and_all_together() -> None:
-    assert {each.value for each in Reproducible} == {*REPRODUCTIONS, "all"}
+    assert {*get_args(Reproducible)} == {*REPRODUCTIONS, "all"}
 
 
 @pytest.mark.complete

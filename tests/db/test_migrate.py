@@ -14,8 +14,9 @@ from sqlalchemy import CheckConstraint
 
 from app.common.errors import SchemaError, StorageError
 from app.common.settings import Settings
+from app.db.base import Base
 from app.db.migrate import migrate, require_current, revision_of
-from app.db.models import Base, TrajectoryRow, TrialRow
+from app.db.models import TrajectoryRow, TrialRow
 from app.db.revision import REVISION, is_current
 from app.db.session import Database, open_engine
 from app.main import create_app

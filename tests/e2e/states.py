@@ -28,7 +28,8 @@ from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
 from app.core.tuning.landscape import predict_points
-from app.db.models import Base, EventRow, ProposalRow
+from app.db.base import Base
+from app.db.models import EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registration
 from app.fleet.schemas import NewVehicle

@@ -1,6 +1,5 @@
 """Photos of flights, stored as uploaded."""
 
-from dataclasses import dataclass
 from typing import Final
 
 from sqlalchemy import func, select
@@ -9,6 +8,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.trials.schemas import TrialPhoto
 from app.common.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
+from app.db.base import added
 from app.db.models import TrialPhotoRow, TrialRow
 
 MAX_BYTES: Final = 10 * 2**20
@@ -18,15 +18,6 @@ ENDINGS: Final = {"image/jpeg": "jpg", "image/png": "png", "image/webp": "webp"}
 _JPEG: Final = b"\xff\xd8\xff"
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 _RIFF, _WEBP = b"RIFF", b"WEBP"
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A photo's bytes and its file name for download."""
-
-    media_type: str
-    data: bytes
-    file_name: str
 
 
 def media_type_of(content: bytes) -> str | None:
@@ -67,10 +58,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
             f"Flight {trial.number} has {MAX_PER_TRIAL} photos, the maximum.",
             hint="Delete one of them, then add this one.",
         )
-    row = TrialPhotoRow(trial=trial, media_type=media_type, data=content)
-    session.add(row)
-    session.flush()
-    return TrialPhoto.view_of(row)
+    return TrialPhoto.view_of(added(session, TrialPhotoRow(trial=trial, media_type=media_type, data=content)))
 
 
 def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:
@@ -94,11 +82,11 @@ def photos_of_campaign(session: Session, campaign_id: int) -> list[tuple[TrialPh
     return [(row, size) for row, size in session.execute(wanted)]
 
 
-def get_picture(session: Session, trial_id: int, photo_id: int) -> Picture:
-    """Raises NotFoundError."""
+def get_picture(session: Session, trial_id: int, photo_id: int) -> tuple[TrialPhotoRow, str]:
+    """The photo and its file name for download. Raises NotFoundError."""
     row = _one(session, trial_id, photo_id)
     name = f"campaign-{row.trial.campaign_id}-trial-{row.trial.number}-photo-{row.id}.{ENDINGS[row.media_type]}"
-    return Picture(row.media_type, row.data, name)
+    return row, name
 
 
 def delete_photo(session: Session, trial_id: int, photo_id: int) -> None:

@@ -43,7 +43,7 @@ from app.core.records.step_response import StepResponse, step_response
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import landing_battery_v
 from app.db import trajectories
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -54,7 +54,7 @@ _SINGLE_PRECISION: Final = 1e-6
 """Logs store gains as single-precision numbers."""
 
 
-def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
+def settle_gains(session: Session, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
     """Set the trial's gains to those in the log; a CSV file, which contains none, leaves them as planned.
 
     Where the values differ and that is `confirmed`, the trial takes the gains that were flown and loses the prediction
@@ -88,7 +88,7 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
             problems=(Problem("confirm", f"the log was flown with {held}"),),
         )
     row.read_back = dict(flown.gains)
-    row.gains, gate = gated_gains(session, campaign, flown.gains)
+    row.gains, gate = gated_gains(session, row.campaign, flown.gains)
     row.gate, row.kind = proposals.gate_json(gate), "manual"
     row.predicted_error = row.predicted_interval = None
     if (curve := row.predicted) is not None:
@@ -149,7 +149,6 @@ def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:
 
 def capture(
     session: Session,
-    campaign: CampaignRow,
     row: TrialRow,
     trajectory: Trajectory,
     *,
@@ -168,7 +167,7 @@ def capture(
     stored = trajectories.store_trajectory(session, trajectory)
     row.trajectory = stored
     recorded = trajectories.trajectory_of(session, stored.id)
-    experiment = experiment_of_campaign(campaign)
+    experiment = experiment_of_campaign(row.campaign)
     judged = score(experiment, recorded)
     glitches = find_glitches(experiment, recorded)
     row.glitches = [asdict(glitch) for glitch in glitches]
@@ -192,7 +191,7 @@ def capture(
         set_trial_state(row, TrialState.ABORTED)
         return
     row.error = judged.error  # shown before a person classifies the flight, which scores it again
-    if fleet.is_classed_automatically(campaign.vehicle):
+    if fleet.is_classed_automatically(row.campaign.vehicle):
         _classify(row, reason if ending == "invalid" else judged.refusal)
 
 
@@ -226,18 +225,18 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
-def _capture_import(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, invalid: bool) -> None:
+def _capture_import(session: Session, row: TrialRow, flown: Takeoff, *, invalid: bool) -> None:
     """Capture the record, as an invalid one if it begins at lift-off. Unless `invalid`, raises UnconfirmedError for a
     record that nobody's judgement can make valid, such as one that ends too early."""
     refusal = "" if flown.is_commanded else NOT_COMMANDED
-    unscorable = refusal or score(experiment_of_campaign(campaign), flown.trajectory, accept_gaps=True).refusal
+    unscorable = refusal or score(experiment_of_campaign(row.campaign), flown.trajectory, accept_gaps=True).refusal
     if unscorable and not invalid:
         raise UnconfirmedError(
             f"The record is {refusal}." if refusal else f"The record cannot be scored: {unscorable}.",
             hint="Choose the complete log of this flight, or confirm that it is stored as an invalid flight.",
             problems=(Problem("invalid", unscorable),),
         )
-    capture(session, campaign, row, flown.trajectory, ending="invalid" if refusal else "completed", reason=refusal)
+    capture(session, row, flown.trajectory, ending="invalid" if refusal else "completed", reason=refusal)
 
 
 def import_record(
@@ -256,27 +255,27 @@ def import_record(
     when the record cannot be stored, NotAllowedError when the client may not command a real vehicle.
     """
     row = history.trial_row(session, trial_id)
-    campaign = campaigns.get_row(session, row.campaign_id)
+    campaign = row.campaign
     require_may(Permission.REVIEW, campaign.vehicle, context)
     check_action(TRIAL_ACTIONS, "upload", row.state, f"Flight {row.number}")
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
-        settle_gains(session, campaign, row, flown, confirmed=confirmed)
-        _capture_import(session, campaign, row, flown, invalid=invalid)
+        settle_gains(session, row, flown, confirmed=confirmed)
+        _capture_import(session, row, flown, invalid=invalid)
         proposals.history_changed(session, campaign)
-        return trial_view(session, campaign, row)
+        return trial_view(session, row)
     if fleet.can_fly(campaign.vehicle):
         raise ConflictError(
             f"This campaign is flown from here, by {campaign.vehicle.title}; it accepts no records of other flights.",
             hint="Fly it, or choose a campaign whose vehicle is “Flown elsewhere”.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
-    settle_gains(session, campaign, row, flown, confirmed=confirmed)
+    settle_gains(session, row, flown, confirmed=confirmed)
     proposals.start_flying(campaign)
     row.flown_at = utc_now()
-    _capture_import(session, campaign, row, flown, invalid=invalid)
+    _capture_import(session, row, flown, invalid=invalid)
     proposals.finish_flying(session, campaign)
-    return trial_view(session, campaign, row)
+    return trial_view(session, row)
 
 
 def plan_and_import(
@@ -333,7 +332,7 @@ def import_into_campaign(
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
     """Thinned record of a trial. Raises NotFoundError when there is none, StorageError when it is damaged."""
     row = history.trial_row(session, trial_id)
-    return trajectory_view(campaigns.get_row(session, row.campaign_id), row, history.record_of(session, row), points)
+    return trajectory_view(row, history.record_of(session, row), points)
 
 
 def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:

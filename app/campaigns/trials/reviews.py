@@ -4,7 +4,6 @@ from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.campaigns import history, proposals
-from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.records import Score, keep_response, score
@@ -13,7 +12,7 @@ from app.campaigns.trials.views import reason_of, trial_view
 from app.common.conflict_checks import check_action, check_transition, check_version
 from app.common.errors import ConflictError, InputError, Problem
 from app.common.states import CAMPAIGN_ACTIONS, TRIAL_ACTIONS, TRIAL_TRANSITIONS, TrialState
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import TrialRow
 from app.fleet.control import require_may
 
 
@@ -27,8 +26,7 @@ def classify_trial(
     when a flight without a usable record is to count, NotAllowedError when the client may not command a real vehicle.
     """
     row = history.trial_row(session, trial_id)
-    campaign = campaigns.get_row(session, row.campaign_id)
-    require_may(Permission.REVIEW, campaign.vehicle, context)
+    require_may(Permission.REVIEW, row.campaign.vehicle, context)
     outcome = TrialState(classification.outcome)
     check_version(
         classification.version,
@@ -38,16 +36,16 @@ def classify_trial(
     )
     check_action(TRIAL_ACTIONS, "classify", row.state, f"Flight {row.number}")
     check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Flight {row.number}")
-    check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
+    check_action(CAMPAIGN_ACTIONS, "judge", row.campaign.state, f"Campaign {row.campaign_id}")
     row.error = None
     if outcome == TrialState.VALID:
-        counted = _counted_score(session, campaign, row)
+        counted = _counted_score(session, row)
         row.error = counted.error
         keep_response(row, counted.response)
     set_trial_state(row, outcome, reason=classification.reason)
     row.version += 1
-    proposals.history_changed(session, campaign)
-    return trial_view(session, campaign, row)
+    proposals.history_changed(session, row.campaign)
+    return trial_view(session, row)
 
 
 def judge_abort(
@@ -59,13 +57,12 @@ def judge_abort(
     changed the trial first; NotAllowedError when the client may not command a real vehicle.
     """
     row = history.trial_row(session, trial_id)
-    campaign = campaigns.get_row(session, row.campaign_id)
-    require_may(Permission.REVIEW, campaign.vehicle, context)
+    require_may(Permission.REVIEW, row.campaign.vehicle, context)
     check_version(
         judgement.version, row.version, f"Flight {row.number}", {"cause": (row.abort_cause or "", judgement.cause)}
     )
     check_action(TRIAL_ACTIONS, "judge abort", row.state, f"Flight {row.number}")
-    check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
+    check_action(CAMPAIGN_ACTIONS, "judge", row.campaign.state, f"Campaign {row.campaign_id}")
     if row.abort_cause == "limit":
         raise ConflictError(
             f"Flight {row.number} was aborted automatically because a limit was exceeded: it counts against its gains.",
@@ -73,11 +70,11 @@ def judge_abort(
         )
     row.abort_cause = judgement.cause
     row.version += 1
-    proposals.history_changed(session, campaign)
-    return trial_view(session, campaign, row)
+    proposals.history_changed(session, row.campaign)
+    return trial_view(session, row)
 
 
-def _counted_score(session: Session, campaign: CampaignRow, row: TrialRow) -> Score:
+def _counted_score(session: Session, row: TrialRow) -> Score:
     """Score of a flight that a person counts in spite of its gaps. Raises InputError for an aborted or unscorable
     flight."""
     if row.ending == "aborted":
@@ -89,7 +86,7 @@ def _counted_score(session: Session, campaign: CampaignRow, row: TrialRow) -> Sc
     judged = (
         None
         if row.trajectory_id is None
-        else score(experiment_of_campaign(campaign), history.record_of(session, row), accept_gaps=True)
+        else score(experiment_of_campaign(row.campaign), history.record_of(session, row), accept_gaps=True)
     )
     if judged is None or judged.error is None:
         reason = judged.refusal if judged is not None else "it has no record"

@@ -148,13 +148,13 @@ def list_photos(session: Reader, trial_id: Id) -> list[TrialPhoto]:
 @router.get("/trials/{trial_id}/photos/{photo_id}", response_class=Response, responses=described(*photos.ENDINGS))
 def get_photo(session: Reader, trial_id: Id, photo_id: Id) -> Response:
     """A picture as uploaded. Its headers keep it from running or loading anything when it is opened by itself."""
-    picture = photos.get_picture(session, trial_id, photo_id)
+    picture, name = photos.get_picture(session, trial_id, photo_id)
     return Response(
         picture.data,
         media_type=picture.media_type,
         headers={
             "Cache-Control": "private, max-age=31536000, immutable",
-            "Content-Disposition": f'inline; filename="{picture.file_name}"',
+            "Content-Disposition": f'inline; filename="{name}"',
             "Content-Security-Policy": "default-src 'none'; sandbox; frame-ancestors 'none'",
         },
     )

@@ -6,9 +6,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from app.campaigns.schemas import Variant
-from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Schema, Text, Version
+from app.common.schemas import Gains, Gate, Number, OptionValue, Reason, Request, Schema, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
+from app.core.records.glitches import Glitch
 from app.core.statistics.comparisons import Verdict
+from app.core.tuning.strategy import Interval
 from app.vehicles.flight_end import FlightEnd
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
@@ -156,15 +158,6 @@ class TrialComparison(Schema):
     confidence: float | None
     difference: float
     standard_error: float | None
-
-
-class Glitch(Schema):
-    """A part of the record that cannot be real, between the last good sample before it and the first good one after."""
-
-    kind: Literal["acceleration", "frozen", "gap", "disagreement"]
-    start_s: float
-    end_s: float
-    sentence: str
 
 
 class Trial(Schema):

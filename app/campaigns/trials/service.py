@@ -6,6 +6,7 @@ Every gain set passes the gate before it becomes a trial; an operator may overru
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -22,7 +23,7 @@ from app.campaigns.trials.views import trial_view, trial_views
 from app.campaigns.variants import gains_of
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, InputError, Problem
-from app.common.schemas import Gate, Page, decode_cursor, encode_cursor
+from app.common.schemas import Gate, Page
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.errors import TrajectoryError
@@ -30,8 +31,11 @@ from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategy import Proposal
-from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.base import added
+from app.db.models import CampaignRow, ProposalRow, TrialRow
+from app.db.pages import Order, page_of
 from app.db.trajectories import pack
+from app.db.types import JsonObject
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.vehicles.flight_end import not_begun
@@ -98,6 +102,7 @@ def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, ov
     return GateDecision(gains, proposals.gate_json(gate), reason)
 
 
+_BY_NUMBER: Final = Order("number", TrialRow.number.expression)
 KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repeat": "repeat", "baseline": "baseline"}
 
 
@@ -109,7 +114,7 @@ def cancel_trial(session: Session, trial_id: int) -> Trial:
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, end=not_begun("the trial was cancelled"))
     set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
-    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+    return trial_view(session, row)
 
 
 def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
@@ -132,15 +137,13 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
 def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
     """List trials by number. Raises NotFoundError, or InputError for a cursor of another list."""
     campaign = campaigns.get_row(session, campaign_id)
-    after = 0 if cursor is None else decode_cursor("number", cursor, float)[1]
-    rows, total = repository.trial_page(session, campaign_id, after_number=after, limit=limit)
-    following = encode_cursor("number", (0, rows[limit - 1].number)) if len(rows) > limit else None
-    return Page(items=trial_views(session, campaign, rows[:limit]), total=total, next_cursor=following)
+    wanted, view = repository.trials_wanted(campaign_id), partial(trial_views, session, campaign)
+    return page_of(session, wanted, _BY_NUMBER, cursor=cursor, limit=limit, view=view)
 
 
 def get_trial(session: Session, trial_id: int) -> Trial:
     """Raises NotFoundError."""
-    return _seen(session, history.trial_row(session, trial_id))
+    return trial_view(session, history.trial_row(session, trial_id))
 
 
 Predict = Callable[[Session, CampaignRow, Gains], Proposal | None]
@@ -183,9 +186,7 @@ def create_trial(
         row.predicted_error, row.predicted_interval = proposal.predicted_error, proposal.interval
     elif predict is not None:
         _keep_prediction(row, predict(session, campaign, gains))
-    session.add(row)
-    session.flush()
-    return trial_view(session, campaign, row)
+    return trial_view(session, added(session, row))
 
 
 def _keep_prediction(row: TrialRow, found: Proposal | None) -> None:
@@ -221,11 +222,7 @@ def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     check_version(edit.version, row.version, f"Flight {row.number}", {"note": (row.note, edit.note)})
     row.note = edit.note
     row.version += 1
-    return _seen(session, row)
-
-
-def _seen(session: Session, row: TrialRow) -> Trial:
-    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+    return trial_view(session, row)
 
 
 def _chosen(session: Session, campaign: CampaignRow, new: TrialPlan) -> tuple[GateDecision, ProposalRow | None]:

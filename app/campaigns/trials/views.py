@@ -16,7 +16,6 @@ from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.common.conflict_checks import allowed
-from app.common.schemas import Interval
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
@@ -25,7 +24,7 @@ from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
-from app.core.tuning.predictions import is_informative
+from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.end_texts import cause_text, end_text, is_worded, unstaged_text
@@ -37,7 +36,8 @@ CONFIDENCE: Final = 0.9
 class ReferenceFlights:
     """The valid flights that a campaign's trials are compared with, indexed for constant or logarithmic lookup.
 
-    `valid` are the flights in their order, `prior` is the experiment's scatter.
+    `valid` are the flights in their order, `prior` is the experiment's scatter. `by_number` and `by_gains` hold all
+    flights with the gains of one.
     """
 
     def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
@@ -45,8 +45,8 @@ class ReferenceFlights:
         scored = [(flight.error, flight.number) for flight in valid if flight.error is not None]
         self._numbers = [number for _, number in scored]
         self._best_so_far = list(accumulate(scored, min))
-        self._by_number: Mapping[int, Group] = {number: group for group in groups for number in group.numbers}
-        self._by_gains: Mapping[object, Group] = {_key(group.gains): group for group in groups}
+        self.by_number: Final[Mapping[int, Group]] = {number: group for group in groups for number in group.numbers}
+        self.by_gains: Final[Mapping[object, Group]] = {_key(group.gains): group for group in groups}
         self.scatter: Final[PooledScatter | None] = pool_scatter(groups, prior) if groups else None
 
     def best_before(self, number: int) -> tuple[float, int] | None:
@@ -58,26 +58,18 @@ class ReferenceFlights:
         """Number of the first flight, if it is before the given one."""
         return self._numbers[0] if self._numbers and self._numbers[0] < number else None
 
-    def group_of(self, number: int) -> Group | None:
-        """All flights with the gains of the given flight."""
-        return self._by_number.get(number)
-
-    def group_with(self, gains: Gains) -> Group | None:
-        """All flights of the given gains."""
-        return self._by_gains.get(_key(gains))
-
 
 def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
     """Comparisons with the best flight before this one, then with the first; flights of the same gains are left out.
 
     Each side counts with all flights of its gains.
     """
-    own = field.group_of(row.number)
+    own = field.by_number.get(row.number)
     if own is None or field.scatter is None:
         return []
     found = []
     for against, number in _others(row, field):
-        other = field.group_of(number)
+        other = field.by_number.get(number)
         if other is None or other.gains == own.gains:
             continue
         comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
@@ -98,9 +90,9 @@ def _key(gains: Gains) -> object:
     return tuple(sorted(gains.items()))
 
 
-def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
+def trial_view(session: Session, row: TrialRow) -> Trial:
     """View of one trial; the errors of earlier trials are loaded for its verdict."""
-    return trial_views(session, campaign, [row])[0]
+    return trial_views(session, row.campaign, [row])[0]
 
 
 def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
@@ -109,13 +101,13 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     flights = history.latest_flights(session, [row.id for row in rows])
     field = ReferenceFlights(history.valid_flights(session, campaign.id), experiment_of_campaign(campaign).scatter)
     rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
-    return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
+    return [_view(row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
-def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
+def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
     """View of a record, thinned to at most `points` samples such that the scored output keeps its peaks."""
     assert row.trajectory is not None
-    output = get_experiment(campaign.experiment).output
+    output = get_experiment(row.campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
     chosen = select_samples(trajectory.time_s, leading, points)
     return TrajectoryOut(
@@ -130,13 +122,7 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
     )
 
 
-def _view(
-    campaign: CampaignRow,
-    row: TrialRow,
-    field: ReferenceFlights,
-    flight: FlightRow | None,
-    rehearsed: bool,
-) -> Trial:
+def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
     predicted_error, interval = _prediction(row, field)
     return Trial.view_of(
         row,
@@ -145,26 +131,23 @@ def _view(
         inside_interval=_is_inside(interval, row),
         group=_group(row, field),
         comparisons=comparisons(row, field),
-        verdict=verdict(row, field, get_experiment(campaign.experiment).error_unit, _flown_before(row, field)),
+        verdict=verdict(row, field, get_experiment(row.campaign.experiment).error_unit, _flown_before(row, field)),
         glitches=row.glitches or [],
         record=_record(row),
-        may_be_valid=_may_be_valid(campaign, row),
+        may_be_valid=_may_be_valid(row),
         flight=_flight(flight),
         speed=flight.speed if flight else None,
         settings=row.settings or {},
         reason=reason_of(row),
         given_reason=row.reason,
-        actions=_actions(campaign, row, flight, rehearsed),
+        actions=_actions(row, flight, rehearsed),
     )
 
 
 def _prediction(row: TrialRow, field: ReferenceFlights) -> tuple[float | None, Interval | None]:
     """The predicted error and its interval; both None if they said nothing."""
-    interval = None if row.predicted_interval is None else Interval.model_validate(row.predicted_interval)
-    lower = None if interval is None else interval.lower
-    if not is_informative(lower, corrected=field.best_before(row.number) is not None):
-        return None, None
-    return row.predicted_error, interval
+    is_corrected = field.best_before(row.number) is not None
+    return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
 
 
 def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
@@ -174,7 +157,7 @@ def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
 
 
 def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
-    same = field.group_with(row.gains)
+    same = field.by_gains.get(_key(row.gains))
     if same is None or field.scatter is None:
         return None
     return GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size)
@@ -182,7 +165,7 @@ def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
 
 def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
     """Numbers of the earlier flights with the gains of this trial."""
-    same = field.group_with(row.gains)
+    same = field.by_gains.get(_key(row.gains))
     return [] if same is None else [number for number in same.numbers if number < row.number]
 
 
@@ -252,11 +235,11 @@ def _record(trial: TrialRow) -> RecordBrief | None:
     return RecordBrief.view_of(row, ending=trial.ending or "completed", channels=channels, units=_units(channels))
 
 
-def _may_be_valid(campaign: CampaignRow, row: TrialRow) -> bool:
+def _may_be_valid(row: TrialRow) -> bool:
     """Whether a person may mark the flight valid. Without its record, which is large: its last time is in the curve."""
     if row.state not in {TrialState.CAPTURED, TrialState.INVALID} or row.ending == "aborted" or not row.curve:
         return row.state == TrialState.VALID
-    return row.curve[-1][0] >= float(experiment_of_campaign(campaign).grid_s[-1]) - MAX_GAP_S
+    return row.curve[-1][0] >= float(experiment_of_campaign(row.campaign).grid_s[-1]) - MAX_GAP_S
 
 
 def _units(channels: Iterable[str]) -> dict[str, str]:
@@ -274,10 +257,10 @@ def _flight(row: FlightRow | None) -> FlightBrief | None:
     )
 
 
-def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
+def _actions(row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
     """Allowed actions: those of the state table, less what the vehicle cannot do, what an active flight rules out, and
     what a missing rehearsal of a real vehicle rules out."""
-    vehicle = campaign.vehicle
+    vehicle = row.campaign.vehicle
     under_way = flight is not None and flight.state in ACTIVE_FLIGHT_STATES
     impossible = set()
     if under_way or not fleet.can_fly(vehicle):
@@ -292,7 +275,7 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, reh
         impossible.add("take-off")
     if fleet.can_fly(vehicle) and row.state == TrialState.PLANNED:
         impossible.add("upload")
-    if campaign.state not in CAMPAIGN_ACTIONS["judge"]:
+    if row.campaign.state not in CAMPAIGN_ACTIONS["judge"]:
         impossible |= {"classify", "upload", "judge abort"}
     if row.abort_cause == "limit":
         impossible.add("judge abort")

@@ -28,8 +28,9 @@ MONITORED_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fitted:
-    """A fitted parameter with its standard error, in its unit."""
+    """A fitted parameter of the model with its standard error, in its unit."""
 
+    name: str
     title: str
     unit: str
     value: float

@@ -210,7 +210,7 @@ class Advice:
     """What to do next, with which gains, and why. Kind `baseline` is the first flight, or a repeat with its gains."""
 
     kind: AdviceKind
-    gains: dict[str, float]
+    gains: dict[str, int | float]
     why: str
 
 

@@ -15,7 +15,7 @@ import {
 import type { Theme } from "./queries";
 import type { RecordFiles } from "./records";
 
-export type { CheckedSignal, ControllerCheck, ControllerCheckSummary } from "./generated";
+export type { ControllerCheck, ControllerCheckSummary, SignalResult } from "./generated";
 export type CheckFigureName = GetControllerCheckFigureData["path"]["name"];
 
 const PAGE_SIZE = 20;

@@ -1,7 +1,7 @@
 import { Box, Skeleton, Title, UnstyledButton } from "@mantine/core";
 import { IconChevronDown } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
-import type { GainInfo } from "../api/types";
+import type { Gain } from "../api/types";
 import { type NumberEntry, NumberField } from "./Fields";
 import classes from "./Form.module.css";
 import { unitAfter } from "./format";
@@ -67,7 +67,7 @@ function outOfRange(value: NumberEntry | undefined, lower: number, upper: number
 
 interface GainFieldsProps {
   legend: string;
-  gains: readonly GainInfo[];
+  gains: readonly Gain[];
   values: Readonly<Record<string, NumberEntry>>;
   /** Refusals by field name, which is `prefix` and the gain's name. */
   reasons: Readonly<Record<string, string>>;

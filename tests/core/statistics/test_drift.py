@@ -5,12 +5,18 @@ from app.core.statistics.drift import Fitted, drift
 
 def hover(value: float, standard_error: float) -> dict[str, Fitted]:
     return {
-        "hover_throttle": Fitted(title="Hover throttle", unit="of full", value=value, standard_error=standard_error)
+        "hover_throttle": Fitted(
+            name="hover_throttle", title="Hover throttle", unit="of full", value=value, standard_error=standard_error
+        )
     }
 
 
 def lag(value: float, standard_error: float) -> dict[str, Fitted]:
-    return {"motor_lag_s": Fitted(title="Motor lag", unit="s", value=value, standard_error=standard_error)}
+    return {
+        "motor_lag_s": Fitted(
+            name="motor_lag_s", title="Motor lag", unit="s", value=value, standard_error=standard_error
+        )
+    }
 
 
 def test_a_change_within_the_interval_is_no_drift() -> None:

@@ -839,16 +839,6 @@ export const bringInBundle = <ThrowOnError extends boolean = false>(options: Opt
 });
 
 /**
- * Get Landscape
- *
- * The gains as a path over the error that the strategy's model predicts, two gains at a time.
- *
- * A job computes it for each proposal, started at the first request by a client that may make changes; until it is
- * done the card is `waiting`.
- */
-export const getLandscape = <ThrowOnError extends boolean = false>(options: Options<GetLandscapeData, ThrowOnError>): RequestResult<GetLandscapeResponses, GetLandscapeErrors, ThrowOnError> => (options.client ?? client).get<GetLandscapeResponses, GetLandscapeErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/figures/landscape', ...options });
-
-/**
  * Get Calibration
  *
  * The model as fitted after each flight, over all campaigns of the vehicle, and whether it should be tuned
@@ -862,6 +852,16 @@ export const getCalibration = <ThrowOnError extends boolean = false>(options: Op
  * The fitted parameters over the vehicle's flights, or the battery voltages before and after each flight.
  */
 export const getVehicleFigure = <ThrowOnError extends boolean = false>(options: Options<GetVehicleFigureData, ThrowOnError>): RequestResult<GetVehicleFigureResponses, GetVehicleFigureErrors, ThrowOnError> => (options.client ?? client).get<GetVehicleFigureResponses, GetVehicleFigureErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/figures/{name}', ...options });
+
+/**
+ * Get Landscape
+ *
+ * The gains as a path over the error that the strategy's model predicts, two gains at a time.
+ *
+ * A job computes it for each proposal, started at the first request by a client that may make changes; until it is
+ * done the card is `waiting`.
+ */
+export const getLandscape = <ThrowOnError extends boolean = false>(options: Options<GetLandscapeData, ThrowOnError>): RequestResult<GetLandscapeResponses, GetLandscapeErrors, ThrowOnError> => (options.client ?? client).get<GetLandscapeResponses, GetLandscapeErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/figures/landscape', ...options });
 
 /**
  * Get Campaign Figure

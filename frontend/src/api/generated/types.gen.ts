@@ -122,8 +122,7 @@ export type AddressInfo = {
 /**
  * Advice
  *
- * The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
- * first flight, or its gains again.
+ * What to do next, with which gains, and why. Kind `baseline` is the first flight, or a repeat with its gains.
  */
 export type Advice = {
     /**
@@ -577,15 +576,15 @@ export type Check = {
     /**
      * Gain
      */
-    gain?: string;
+    gain: string;
     /**
      * Case
      */
-    case?: string;
+    case: string;
     /**
      * Offer
      */
-    offer?: {
+    offer: {
         [key: string]: number | number;
     };
 };
@@ -607,11 +606,11 @@ export type CheckFigure = {
 };
 
 /**
- * CheckedSignal
+ * CheckItem
  *
- * One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`.
+ * Result of one preflight check: what was found, what is required, and what to do if they differ.
  */
-export type CheckedSignal = {
+export type CheckItem = {
     /**
      * Name
      */
@@ -621,45 +620,21 @@ export type CheckedSignal = {
      */
     title: string;
     /**
-     * Largest Difference
+     * Passed
      */
-    largest_difference: number;
+    passed: boolean;
     /**
-     * Difference Unit
+     * Found
      */
-    difference_unit: string;
+    found: string;
     /**
-     * Tolerance
-     *
-     * the largest difference allowed, or the largest median if there is one, same unit
+     * Needed
      */
-    tolerance: number;
+    needed: string;
     /**
-     * Allowance
-     *
-     * description of the tolerance
+     * Hint
      */
-    allowance: string;
-    /**
-     * Verdict
-     */
-    verdict: 'exact' | 'agrees' | 'differs';
-    /**
-     * Different
-     *
-     * number of samples that differ by more than the tolerance
-     */
-    different: number;
-    /**
-     * First Different S
-     */
-    first_different_s: number | null;
-    /**
-     * Median Difference
-     *
-     * decides the verdict, if it is given; else the largest difference does
-     */
-    median_difference: number | null;
+    hint: string;
 };
 
 /**
@@ -920,7 +895,7 @@ export type ControllerCheck = {
     /**
      * Signals
      */
-    signals: Array<CheckedSignal>;
+    signals: Array<SignalResult>;
     /**
      * Figures
      */
@@ -1186,7 +1161,7 @@ export type Estimate = {
     /**
      * Fitted
      */
-    fitted: Array<FittedNumber>;
+    fitted: Array<Fitted>;
 };
 
 /**
@@ -1265,7 +1240,7 @@ export type ExperimentInfo = {
     /**
      * Gains
      */
-    gains: Array<GainInfo>;
+    gains: Array<Gain>;
     /**
      * Options
      */
@@ -1288,47 +1263,47 @@ export type Explanation = {
     /**
      * Base Flight
      */
-    base_flight?: number | null;
+    base_flight: number | null;
     /**
      * Gradient
      */
-    gradient?: {
+    gradient: {
         [key: string]: number;
     };
     /**
      * Direction
      */
-    direction?: {
+    direction: {
         [key: string]: number;
     };
     /**
      * Ladder
      */
-    ladder?: Array<LadderStep>;
+    ladder: Array<LadderStep>;
     /**
      * Chosen Length
      */
-    chosen_length?: number | null;
+    chosen_length: number | null;
     /**
      * Clipped
      */
-    clipped?: Array<string>;
+    clipped: Array<string>;
     /**
      * Notes
      */
-    notes?: Array<string>;
+    notes: Array<string>;
     /**
      * Lesson
      */
-    lesson?: string;
+    lesson: string;
     /**
      * Fitted
      */
-    fitted?: Array<FittedParameter>;
+    fitted: Array<FittedParameter>;
     /**
      * Trust Fraction
      */
-    trust_fraction?: number | null;
+    trust_fraction: number | null;
 };
 
 /**
@@ -1428,11 +1403,11 @@ export type Finish = {
 };
 
 /**
- * FittedNumber
+ * Fitted
  *
- * A fitted parameter of the model with its standard error.
+ * A fitted parameter of the model with its standard error, in its unit.
  */
-export type FittedNumber = {
+export type Fitted = {
     /**
      * Name
      */
@@ -1831,29 +1806,11 @@ export type FurtherFlights = {
 };
 
 /**
- * GainChange
+ * Gain
  *
- * One gain now (of the best flight, else of the vehicle's safe gains) and next.
+ * One tunable gain, in the controller's own counts or units; `scale` is a step size with a significant effect.
  */
-export type GainChange = {
-    /**
-     * Now
-     */
-    now: number | number;
-    /**
-     * Next
-     */
-    next: number | number;
-    /**
-     * Delta
-     */
-    delta: number | number;
-};
-
-/**
- * GainInfo
- */
-export type GainInfo = {
+export type Gain = {
     /**
      * Name
      */
@@ -1886,6 +1843,26 @@ export type GainInfo = {
      * Integer
      */
     integer: boolean;
+};
+
+/**
+ * GainChange
+ *
+ * One gain now (of the best flight, else of the vehicle's safe gains) and next.
+ */
+export type GainChange = {
+    /**
+     * Now
+     */
+    now: number | number;
+    /**
+     * Next
+     */
+    next: number | number;
+    /**
+     * Delta
+     */
+    delta: number | number;
 };
 
 /**
@@ -2096,7 +2073,7 @@ export type GivenGains = {
 /**
  * Glitch
  *
- * A part of the record that cannot be real, between the last good sample before it and the first good one after.
+ * `start_s` is the time of the last good sample before the glitch, `end_s` of the first good one after it.
  */
 export type Glitch = {
     /**
@@ -2196,7 +2173,8 @@ export type HoverSetting = {
 /**
  * Identity
  *
- * Identity that the vehicle reports over its link; pinned at the first connection without a concern.
+ * Identity of a vehicle: its MAVLink system id, its autopilot, the autopilot's version, and `uid`, the hardware id
+ * in hexadecimal digits. Version and `uid` are empty if the autopilot does not report them.
  */
 export type Identity = {
     /**
@@ -2209,22 +2187,18 @@ export type Identity = {
     autopilot: string;
     /**
      * Version
-     *
-     * empty if the autopilot does not report it
      */
     version: string;
     /**
      * Uid
-     *
-     * hardware id in hexadecimal digits; empty if it is not reported
      */
-    uid?: string;
+    uid: string;
 };
 
 /**
  * Interval
  *
- * Interval that contains an error with probability `confidence`.
+ * Predicted interval of the error, with probability `confidence`.
  */
 export type Interval = {
     /**
@@ -2322,41 +2296,11 @@ export type JobLog = {
     /**
      * Lines
      */
-    lines: Array<JobLogLine>;
+    lines: Array<LogLine>;
     /**
      * Total
      */
     total: number;
-};
-
-/**
- * JobLogLine
- *
- * A line of the worker's log about a job. `exception` is a traceback, empty without one.
- */
-export type JobLogLine = {
-    /**
-     * At
-     */
-    at: string;
-    /**
-     * Level
-     */
-    level: string;
-    /**
-     * Message
-     */
-    message: string;
-    /**
-     * Details
-     */
-    details: {
-        [key: string]: string;
-    };
-    /**
-     * Exception
-     */
-    exception: string;
 };
 
 /**
@@ -2398,7 +2342,7 @@ export type LadderStep = {
     /**
      * Clipped
      */
-    clipped?: Array<string>;
+    clipped: Array<string>;
 };
 
 /**
@@ -2583,6 +2527,36 @@ export type LogEvidence = {
 };
 
 /**
+ * LogLine
+ *
+ * One log line: `details` are its further fields as text, `exception` is a traceback, empty without one.
+ */
+export type LogLine = {
+    /**
+     * At
+     */
+    at: string;
+    /**
+     * Level
+     */
+    level: string;
+    /**
+     * Message
+     */
+    message: string;
+    /**
+     * Details
+     */
+    details: {
+        [key: string]: string;
+    };
+    /**
+     * Exception
+     */
+    exception: string;
+};
+
+/**
  * LoggedBehaviour
  *
  * How the altitude loop behaved in the flight.
@@ -2618,6 +2592,26 @@ export type LoggedBehaviour = {
      * share of the rows with the throttle at a limit
      */
     saturated_share: number;
+};
+
+/**
+ * Loss
+ *
+ * Something that takes readiness back, what it means now, and the way on.
+ */
+export type Loss = {
+    /**
+     * Kind
+     */
+    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'checks failed' | 'quarantined' | 'control ended' | 'controlled by other';
+    /**
+     * What
+     */
+    what: string;
+    /**
+     * Way On
+     */
+    way_on: string;
 };
 
 /**
@@ -2777,11 +2771,11 @@ export type OptionInfo = {
      *
      * the title without the help for entering a value; empty if it has none
      */
-    label?: string;
+    label: string;
     /**
      * Unit
      */
-    unit?: string;
+    unit: string;
     /**
      * Default
      */
@@ -2789,21 +2783,21 @@ export type OptionInfo = {
     /**
      * Choices
      */
-    choices?: Array<boolean | number | number | string>;
+    choices: Array<boolean | number | number | string>;
     /**
      * Lower
      */
-    lower?: number | null;
+    lower: number | null;
     /**
      * Upper
      */
-    upper?: number | null;
+    upper: number | null;
     /**
      * Autopilots
      *
      * the autopilots that have this option; empty: all
      */
-    autopilots?: Array<string>;
+    autopilots: Array<string>;
 };
 
 /**
@@ -3106,26 +3100,6 @@ export type Proposal = {
      * Computed At
      */
     computed_at: string;
-};
-
-/**
- * ReadinessLoss
- *
- * A reason why readiness is lost: what it means now, and what to do.
- */
-export type ReadinessLoss = {
-    /**
-     * Kind
-     */
-    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'checks failed' | 'quarantined' | 'control ended' | 'controlled by other';
-    /**
-     * What
-     */
-    what: string;
-    /**
-     * Way On
-     */
-    way_on: string;
 };
 
 /**
@@ -3469,6 +3443,56 @@ export type Run = {
      * the long version, if there is one
      */
     full?: boolean;
+};
+
+/**
+ * SignalResult
+ *
+ * Result of one signal: the largest difference between recording and replica in `difference_unit`, the tolerance,
+ * the number of samples that differ by more, and the time of the first of these, s. If the signal is judged by its
+ * median difference, that is given, and the tolerance is the median's.
+ */
+export type SignalResult = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Largest Difference
+     */
+    largest_difference: number;
+    /**
+     * Difference Unit
+     */
+    difference_unit: string;
+    /**
+     * Tolerance
+     */
+    tolerance: number;
+    /**
+     * Allowance
+     */
+    allowance: string;
+    /**
+     * Verdict
+     */
+    verdict: 'exact' | 'agrees' | 'differs';
+    /**
+     * Different
+     */
+    different: number;
+    /**
+     * First Different S
+     */
+    first_different_s: number | null;
+    /**
+     * Median Difference
+     */
+    median_difference: number | null;
 };
 
 /**
@@ -4215,7 +4239,7 @@ export type TrialReadiness = {
      *
      * why; the takeoff is refused while there is any
      */
-    losses: Array<ReadinessLoss>;
+    losses: Array<Loss>;
     /**
      * Is Ready
      *
@@ -4338,7 +4362,7 @@ export type Vehicle = {
     /**
      * Checks
      */
-    checks: Array<VehicleCheck> | null;
+    checks: Array<CheckItem> | null;
     /**
      * Checked At
      */
@@ -4434,38 +4458,6 @@ export type VehicleCalibration = {
      */
     estimates: Array<Estimate>;
     retune: Retune;
-};
-
-/**
- * VehicleCheck
- *
- * One item of the preflight check.
- */
-export type VehicleCheck = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Title
-     */
-    title: string;
-    /**
-     * Passed
-     */
-    passed: boolean;
-    /**
-     * Found
-     */
-    found: string;
-    /**
-     * Needed
-     */
-    needed: string;
-    /**
-     * Hint
-     */
-    hint?: string;
 };
 
 /**
@@ -7953,57 +7945,6 @@ export type BringInBundleResponses = {
 
 export type BringInBundleResponse = BringInBundleResponses[keyof BringInBundleResponses];
 
-export type GetLandscapeData = {
-    body?: never;
-    headers?: {
-        /**
-         * X-Gainline-Control
-         *
-         * token of the lease that gives control of the vehicle
-         */
-        'X-Gainline-Control'?: string | null;
-    };
-    path: {
-        /**
-         * Campaign Id
-         */
-        campaign_id: number;
-    };
-    query?: {
-        /**
-         * Theme
-         *
-         * colours for a light or a dark page
-         */
-        theme?: 'light' | 'dark';
-        /**
-         * Stacked
-         *
-         * one column of slices, for a narrow page
-         */
-        stacked?: boolean;
-    };
-    url: '/api/campaigns/{campaign_id}/figures/landscape';
-};
-
-export type GetLandscapeErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type GetLandscapeError = GetLandscapeErrors[keyof GetLandscapeErrors];
-
-export type GetLandscapeResponses = {
-    /**
-     * Successful Response
-     */
-    200: FigureCard;
-};
-
-export type GetLandscapeResponse = GetLandscapeResponses[keyof GetLandscapeResponses];
-
 export type GetCalibrationData = {
     body?: never;
     path: {
@@ -8074,6 +8015,57 @@ export type GetVehicleFigureResponses = {
 };
 
 export type GetVehicleFigureResponse = GetVehicleFigureResponses[keyof GetVehicleFigureResponses];
+
+export type GetLandscapeData = {
+    body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+        /**
+         * Stacked
+         *
+         * one column of slices, for a narrow page
+         */
+        stacked?: boolean;
+    };
+    url: '/api/campaigns/{campaign_id}/figures/landscape';
+};
+
+export type GetLandscapeErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetLandscapeError = GetLandscapeErrors[keyof GetLandscapeErrors];
+
+export type GetLandscapeResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetLandscapeResponse = GetLandscapeResponses[keyof GetLandscapeResponses];
 
 export type GetCampaignFigureData = {
     body?: never;

@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import type { FlightChoice, GainInfo, Gate, Proposal } from "../../api/types";
+import type { FlightChoice, Gain, Proposal } from "../../api/types";
 import {
   changeText,
   type GainRow,
@@ -59,7 +59,7 @@ describe("a table of gains", () => {
   const known = [
     { name: "kp", lower: 0, upper: 4000, integer: true },
     { name: "ki", lower: 0, upper: 1073, integer: true },
-  ] as GainInfo[];
+  ] as Gain[];
 
   test("has the campaign's bounds before the experiment's", () => {
     expect(gainRows(proposal(step), next, known, { kp: [100, 2000] })).toEqual([
@@ -133,12 +133,14 @@ describe("typed gains", () => {
 });
 
 test("a refusal names the gains, the reasons, and what would pass", () => {
+  const bare = { worst: null, limit: null, gain: "", case: "", offer: {} };
+  const outside = { gain: "kp", offer: { kp: 4000 } };
   const checks = [
-    { name: "bounds", passed: false, sentence: "kp must be between 0 and 4000.", gain: "kp", offer: { kp: 4000 } },
-    { name: "altitude", passed: false, sentence: "It rises to 9 m." },
-    { name: "wrapping", passed: true, sentence: "No product can wrap." },
+    { ...bare, name: "bounds", passed: false, sentence: "kp must be between 0 and 4000.", ...outside },
+    { ...bare, name: "altitude", passed: false, sentence: "It rises to 9 m." },
+    { ...bare, name: "wrapping", passed: true, sentence: "No product can wrap." },
   ];
-  expect(refusalOf({ passed: false, checks } as Gate).problems).toEqual([
+  expect(refusalOf({ passed: false, checks }).problems).toEqual([
     { field: "gains.kp", reason: "kp must be between 0 and 4000.", offer: { kp: 4000 } },
     { field: "gains", reason: "It rises to 9 m." },
   ]);

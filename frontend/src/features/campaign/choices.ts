@@ -2,7 +2,7 @@
 
 import type { GainSet } from "../../api/evaluation";
 import type { Problem } from "../../api/problems";
-import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal, RepeatGroup } from "../../api/types";
+import type { FlightChoice, Gain, Gate, NewTrial, Proposal, RepeatGroup } from "../../api/types";
 import { flightsText, gainText, readNumber } from "../../ui/format";
 
 type FlownGains = Pick<RepeatGroup, "trial_numbers">;
@@ -60,7 +60,7 @@ export interface GainRow {
 export function gainRows(
   { changes }: Proposal,
   next: Readonly<Record<string, number | null>>,
-  known: readonly GainInfo[],
+  known: readonly Gain[],
   bounds: Readonly<Record<string, readonly number[]>>,
 ): GainRow[] {
   return Object.entries(changes).map(([name, { now }]) => {
@@ -105,7 +105,7 @@ export function sliderStep({ integer, bounds }: GainRow): number {
 /** Typed gains: the numbers, null for what is none, and the reasons. */
 export function readGains(
   texts: Readonly<Record<string, string>>,
-  known: readonly Pick<GainInfo, "name" | "integer">[],
+  known: readonly Pick<Gain, "name" | "integer">[],
 ): {
   values: Record<string, number | null>;
   reasons: Record<string, string>;

@@ -2,7 +2,7 @@ import { useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { type GainSet, useEvaluation } from "../../api/evaluation";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
-import type { Campaign, FlightChoice, GainInfo, GainsPrediction, Gate, Interval, Proposal } from "../../api/types";
+import type { Campaign, FlightChoice, Gain, GainsPrediction, Gate, Interval, Proposal } from "../../api/types";
 import { typed, typedGain } from "../../ui/format";
 import { type ChoiceName, type GainRow, gainRows, isOutside, preselected, readGains } from "./choices";
 import type { GainEntry } from "./GainTable";
@@ -43,7 +43,7 @@ export interface ChosenFlight {
 }
 
 const NOTHING_PREDICTED = { predicted_error: null, interval: null, curve: null, lower: null, upper: null };
-const NO_GAINS: readonly GainInfo[] = [];
+const NO_GAINS: readonly Gain[] = [];
 
 function typedGains(gains: GainSet): Record<string, string> {
   return Object.fromEntries(Object.entries(gains).map(([name, value]) => [name, typedGain(value)]));

@@ -4,7 +4,7 @@ import { inPercent } from "../../api/problems";
 import type {
   CampaignSummary,
   Catalogue,
-  GainInfo,
+  Gain,
   NewCampaign,
   OptionInfo,
   PresetInfo,
@@ -375,7 +375,7 @@ export function inUnitsOfForm(reasons: Readonly<Record<string, string>>): Record
 
 /** A reason about a gain's bounds, at the bounds that are wrong: both, where each is right by itself. */
 export function boundReasons(
-  { lower, upper, integer }: Pick<GainInfo, "lower" | "upper" | "integer">,
+  { lower, upper, integer }: Pick<Gain, "lower" | "upper" | "integer">,
   [low, high]: readonly [NumberEntry, NumberEntry],
   reason: string | undefined,
 ): [minimum: string | undefined, maximum: string | undefined] {

@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
-import type { CheckedSignal } from "../../api/checks";
+import type { SignalResult } from "../../api/checks";
 import { allowances, signalsTable } from "./checks";
 
-const signal = (more: Partial<CheckedSignal>): CheckedSignal => ({
+const signal = (more: Partial<SignalResult>): SignalResult => ({
   name: "thrust",
   title: "Commanded thrust",
   largest_difference: 0,

@@ -1,6 +1,6 @@
 /** Texts and tables of controller checks. */
 
-import type { CheckedSignal, ControllerCheckSummary } from "../../api/checks";
+import type { ControllerCheckSummary, SignalResult } from "../../api/checks";
 import type { FigureTable } from "../../api/types";
 import { gainText, NOTHING } from "../../ui/format";
 import type { StateLabel } from "../../ui/states";
@@ -25,12 +25,12 @@ function brief(value: number): string {
   return gainText(Number.isInteger(value) ? value : Number(value.toPrecision(2)));
 }
 
-function medianText({ median_difference, difference_unit }: CheckedSignal): string {
+function medianText({ median_difference, difference_unit }: SignalResult): string {
   return median_difference === null ? NOTHING : `${brief(median_difference)} ${difference_unit}`;
 }
 
 /** Table with one row per signal; with its median difference if that decides. */
-export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
+export function signalsTable(signals: readonly SignalResult[]): FigureTable {
   const column = (name: string, title: string) => ({ name, title, unit: "", digits: null });
   const areMedians = signals.some(({ median_difference }) => median_difference !== null);
   return {
@@ -56,7 +56,7 @@ export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
 }
 
 /** Allowed differences of the signals: "ff_cmd, fb_cmd, thrust: to the last bit". */
-export function allowances(signals: readonly CheckedSignal[]): string[] {
+export function allowances(signals: readonly SignalResult[]): string[] {
   const names = new Map<string, string[]>();
   for (const { name, allowance } of signals) names.set(allowance, [...(names.get(allowance) ?? []), name]);
   return [...names].map(([allowance, who]) => `${who.join(", ")}: ${allowance}.`);

@@ -5,7 +5,7 @@ import { Link } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";
-import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
+import type { Campaign, CheckItem, Trial, Vehicle } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
 import { ABORT_LABELS, type AbortControl, abortStage, abortText } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
@@ -278,7 +278,7 @@ function Waiting({ text, children }: { text: string; children?: ReactNode }) {
 }
 
 /** Failed preflight checks; renders nothing if all passed. */
-function PreflightChecks({ checks }: { checks: readonly VehicleCheck[] }) {
+function PreflightChecks({ checks }: { checks: readonly CheckItem[] }) {
   const failed = checks.filter(({ passed }) => !passed);
   if (failed.length === 0) return null;
   return (

@@ -1,7 +1,7 @@
 import { Anchor, Box, Button, Text } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 import { Link } from "react-router";
-import { type Job, type JobLogLine, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
+import { type Job, type LogLine, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
 import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import { count, utcTime } from "../../ui/format";
@@ -175,7 +175,7 @@ function JobLog({ job }: { job: Job }) {
   );
 }
 
-function Line({ line: { at, level, message, details, exception } }: { line: JobLogLine }) {
+function Line({ line: { at, level, message, details, exception } }: { line: LogLine }) {
   const more = Object.entries(details).map(([name, value]) => `${name} ${value}`);
   return (
     <li data-level={level}>

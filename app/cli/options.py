@@ -1,0 +1,76 @@
+"""Options of the `gainline` command that are long or shared, and the files that they do not overwrite."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+
+def _begins_otherwise(target: Path | None, *beginnings: bytes) -> bool:
+    """Whether a file exists that is not empty and begins otherwise, such as a log that was to be read."""
+    if target is None or not target.is_file():
+        return False
+    with target.open("rb") as stream:
+        head = stream.read(max(map(len, beginnings)))
+    return bool(head) and not head.startswith(beginnings)
+
+
+def _spare_recording(target: Path | None) -> Path | None:
+    """Refuse to write the result over a file that is no JSON."""
+    if _begins_otherwise(target, b"{"):
+        raise typer.BadParameter(
+            f"{target} exists and is not a JSON file, so it is not overwritten. Name another file, or - to print the "
+            "result."
+        )
+    return target
+
+
+def spare_other_parameters(target: Path | None) -> Path | None:
+    """Refuse to write gains over a file that does not begin as one of them does."""
+    if _begins_otherwise(target, b"# Gainline", b"<!-- Gainline", b"PSC_"):
+        raise typer.BadParameter(
+            f"{target} exists and was not written by this command, so it is not overwritten. Name another file."
+        )
+    return target
+
+
+JsonOut = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.", callback=_spare_recording),
+]
+DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [default: GAINLINE_DATA_DIR]")]
+CampaignSource = Annotated[
+    str,
+    typer.Argument(
+        metavar="PRESET|FILE.yaml",
+        help="A preset, such as ardrone-takeoff or paper-ardrone-takeoff, or a campaign file.",
+    ),
+]
+GivenCampaign = Annotated[str, typer.Argument(metavar="ID|NAME", help="The campaign.")]
+StartGains = Annotated[
+    str | None, typer.Option(metavar="default|simplex|KP,KI,KD", help="Source of the first flight's gains.")
+]
+GivenSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help=(
+            "A setting of the vehicle (scatter=0, wind_m_s=3), the strategy (scaled=false) or the stop rule "
+            "(improvement=0.02). Repeatable."
+        ),
+    ),
+]
+GivenGains = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--gains",
+        metavar="NAME=NUMBER,…",
+        help="A gain set to fly with the `manual` strategy. Repeatable; the sets are flown in this order.",
+    ),
+]
+Overrule = Annotated[
+    str, typer.Option(metavar="REASON", help="Reason to fly gains that the gate refuses (simulations only).")
+]
+Reproducible = Literal["f16", "table1", "table2", "controller", "variability", "all"]
+"""Reproductions of `gainline reproduce`."""
