@@ -99,12 +99,16 @@ class ParameterDistribution:
         sd = np.sqrt(np.maximum(variances, 0.0))
         edge = 0.5 - 0.5 * _PROBABILITY_WITHIN
         normal = ndtri(edge + unit * _PROBABILITY_WITHIN)
-        lower = [parameter.lower for parameter in experiment.model_parameters]
-        upper = [parameter.upper for parameter in experiment.model_parameters]
-        return np.asarray(np.clip(np.array(self.mean) + (normal * sd) @ axes.T, lower, upper))
+        return np.asarray(np.clip(np.array(self.mean) + (normal * sd) @ axes.T, *experiment.limits))
 
 
 _PROBABILITY_WITHIN: Final = 0.9544997361036416
+
+
+def normal_distribution(mean: Vector, covariance: "Matrix", origin: str) -> ParameterDistribution:
+    """The distribution with this mean, shape (m,), and covariance, (m, m)."""
+    rows = tuple(tuple(row) for row in covariance.tolist())
+    return ParameterDistribution(mean=tuple(mean.tolist()), covariance=rows, origin=origin)
 
 
 NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
@@ -119,11 +123,7 @@ def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
     if modelled is None:
         return NO_PARAMETERS
     sd: Vector = np.array([parameter.known_within for parameter in modelled.model_parameters]) / WIDEST_SD
-    return ParameterDistribution(
-        mean=tuple(float(value) for value in modelled.nominal_model),
-        covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()),
-        origin="the data sheet",
-    )
+    return normal_distribution(modelled.nominal_model, np.diag(sd**2), origin="the data sheet")
 
 
 Matrix = NDArray[np.float64]
@@ -308,6 +308,17 @@ class ModelledExperiment(Experiment):
     def nominal_model(self) -> Vector:
         """Nominal parameters, shape (m,), in the order of `model_parameters`."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
+
+    @property
+    def limits(self) -> tuple[Vector, Vector]:
+        """Lowest and highest parameters, shape (m,) each."""
+        parameters = self.model_parameters
+        return np.array([each.lower for each in parameters]), np.array([each.upper for each in parameters])
+
+    @property
+    def prior_sd(self) -> Vector:
+        """Prior standard deviations of the parameters in a fit, shape (m,)."""
+        return np.array([parameter.prior_sd for parameter in self.model_parameters])
 
     def least_model_error(self, base: Trajectory) -> float:  # noqa: ARG002 - not without a resolution of its own
         """Standard deviation, in the error's unit, by which a prediction of even a fitted model is wrong, beside a
