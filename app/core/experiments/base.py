@@ -187,16 +187,6 @@ def fitted_parameters(
     )
 
 
-def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: Vector) -> tuple[ModelParameter, ...]:
-    """The parameters with `mean` and `sd`, shape (m,), in place of the data sheet's values."""
-    return tuple(
-        replace(
-            parameter, nominal=float(value), prior_sd=float(spread), known_within=2.0 * float(spread), expected=None
-        )
-        for parameter, value, spread in zip(parameters, mean, sd, strict=True)
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class Scatter:
     """Prior scatter of the errors of repeated flights.
@@ -274,9 +264,9 @@ class Experiment(ABC):
     def grid_s(self) -> Samples:
         """Times of a model run from the command to the end of the window, shape (n,)."""
 
-    @abstractmethod
     def set_point(self, time_s: Samples) -> Samples:
-        """Set point of the scored output, same shape as `time_s`; zero before the command."""
+        """Set point of the scored output, same shape as `time_s`; zero before the command, and without set points."""
+        return np.zeros_like(time_s) if self.set_points is None else self.set_points.at(time_s)
 
     @abstractmethod
     def errors(self, outputs: Matrix) -> Vector:
@@ -326,8 +316,19 @@ class ModelledExperiment(Experiment):
         return 0.0
 
     @abstractmethod
+    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
+        """The same experiment on another model."""
+
     def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd` have shape (m,)."""
+        """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd`, shape (m,), are in
+        place of the data sheet's values."""
+        fitted = zip(self.model_parameters, mean.tolist(), sd.tolist(), strict=True)
+        return self.with_parameters(
+            tuple(
+                replace(parameter, nominal=value, prior_sd=spread, known_within=2.0 * spread, expected=None)
+                for parameter, value, spread in fitted
+            )
+        )
 
     def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
         """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.
@@ -352,16 +353,17 @@ class ModelledExperiment(Experiment):
         gains (k, g), model (k, m) or (m,) → (k, n) on `grid_s`.
         """
 
-    @abstractmethod
-    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
         """Difference between each recorded step and the model's step from the same state and command.
 
-        In the experiment's own layout for `disturbed_outputs`. None if the record lacks the required channels.
+        In the experiment's own layout for `disturbed_outputs`. None if the record lacks the required channels, and for
+        an experiment whose flights correct the model of the strategy `calibrated` alone.
         """
+        return None
 
-    @abstractmethod
-    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:  # noqa: ARG002
         """`outputs` with the disturbances added to the model's state at the same times, inside the control loop."""
+        return self.outputs(gains, model)
 
     @abstractmethod
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:

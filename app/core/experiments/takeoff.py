@@ -164,10 +164,6 @@ class CopterTakeoff(Experiment):
         """The same as the paper's takeoff."""
         return self._paper.grid_s
 
-    def set_point(self, time_s: Samples) -> Samples:
-        """3 m from the command on."""
-        return self._paper.set_point(time_s)
-
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
         return self._paper.errors(outputs)
