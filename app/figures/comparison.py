@@ -8,7 +8,7 @@ import numpy as np
 from app.core.formatting import short
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, literal, reading, ready, scatter, table_of_curves
-from app.figures.data import Curve
+from app.figures.data import Curve, Scored
 from app.figures.overlays import off_scale
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -34,14 +34,11 @@ Drawn = tuple[int, ComparedCurve, Curve]
 """A flight with its index among all flights, and its curve."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ComparisonData:
+@dataclass(frozen=True, kw_only=True)
+class ComparisonData(Scored):
     """At least two flights, at most 36, the number of combinations of colour and dash."""
 
-    output_title: str
-    output_unit: str
     error_unit: str
-    set_point: Curve
     flights: tuple[ComparedCurve, ...]
 
 

@@ -2,7 +2,7 @@
 best emphasised, the next one's prediction dashed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, cast
 
@@ -314,40 +314,34 @@ class TrajectoriesFigure:
             if curve is not None
         ]
 
-    def _altitude_limit(self, palette: Palette) -> list[Trace]:
+    def _altitude_limit(self, palette: Palette) -> Iterator[Trace]:
         limit_m = self.history.altitude_limit_m
         if limit_m is None:
-            return []
-        return [
-            scatter(
-                "Altitude limit: abort",
-                (self._whole_s, [limit_m, limit_m]),
-                role="limit",
-                line=theme.line(palette.bad, 2, "longdashdot"),
-                legendrank=901,
-                visible=False,
-            )
-        ]
+            return
+        yield scatter(
+            "Altitude limit: abort",
+            (self._whole_s, [limit_m, limit_m]),
+            role="limit",
+            line=theme.line(palette.bad, 2, "longdashdot"),
+            legendrank=901,
+            visible=False,
+        )
 
-    def _prediction(self, palette: Palette) -> list[Trace]:
+    def _prediction(self, palette: Palette) -> Iterator[Trace]:
         proposal = self.history.proposal
         if proposal is None or proposal.curve is None:
-            return []
-        return [
-            self._trace(
-                proposal.curve_name,
-                proposal.curve,
-                CURVE_POINTS,
-                role="prediction",
-                about={"trial": proposal.number},
-                uid="prediction",
-                line=_style(palette, "prediction"),
-                legendrank=899,
-                hovertemplate=reading(
-                    f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit
-                ),
-            )
-        ]
+            return
+        yield self._trace(
+            proposal.curve_name,
+            proposal.curve,
+            CURVE_POINTS,
+            role="prediction",
+            about={"trial": proposal.number},
+            uid="prediction",
+            line=_style(palette, "prediction"),
+            legendrank=899,
+            hovertemplate=reading(f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit),
+        )
 
     def _empty(
         self, palette: Palette, role: str, name: str, points: tuple[list[None], list[None]] = ([], []), **style: Any

@@ -140,6 +140,11 @@ def suffix(index: int) -> str:
     return "" if index == 1 else str(index)
 
 
+def on(index: int) -> dict[str, object]:
+    """The axes of a trace in the panel at an index from 1."""
+    return {"xaxis": f"x{suffix(index)}", "yaxis": f"y{suffix(index)}"}
+
+
 def stacked(index: int, count: int, gap: float) -> list[float]:
     """Bottom and top of one of `count` panels as shares of the whole; the first one, 1, is on top."""
     height = (1 - gap * (count - 1)) / count

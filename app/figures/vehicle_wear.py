@@ -73,15 +73,14 @@ class CalibrationFigure:
 
     def _panel(self, palette: Palette, index: int, name: str) -> Trace:
         shown = [point for point in self.points if name in point.fitted]
-        first, suffix = shown[0].fitted[name], theme.suffix(index)
+        first = shown[0].fitted[name]
         return scatter(
             first.title,
             ([point.flight for point in shown], [point.fitted[name].value for point in shown]),
             role="fitted",
             about={"parameter": name},
             mode="markers",
-            xaxis=f"x{suffix}",
-            yaxis=f"y{suffix}",
+            **theme.on(index),
             error_y={
                 "type": "data",
                 "array": [REACH * point.fitted[name].standard_error for point in shown],
