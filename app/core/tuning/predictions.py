@@ -62,13 +62,38 @@ class TrackRecord:
     of: int
     agreeing: int
     disagreeing: int
-    trustworthy: bool
-    sentence: str
+
+    @property
+    def trustworthy(self) -> bool:
+        """False once at least three flights went in the other direction, and more than went in the predicted one."""
+        return not (self.disagreeing >= _DISAGREEMENTS and self.disagreeing > self.agreeing)
 
     @property
     def share(self) -> float | None:
         """Share of flights inside their interval; None before the first flight with an interval."""
         return self.inside / self.of if self.of else None
+
+    @property
+    def sentence(self) -> str:
+        moved = self.agreeing + self.disagreeing
+        if not self.of and not moved:
+            return "No prediction has been tested by a flight yet."
+        parts = []
+        if self.of == 1:
+            parts.append(f"the only predicted flight ended {'inside' if self.inside else 'outside'} its interval")
+        elif self.of:
+            parts.append(f"{self.inside} of {self.of} flights ended inside their predicted interval")
+        if moved:
+            changed = f"{count(moved, 'flight')} with new gains changed the error in the predicted direction"
+            parts.append(f"{self.agreeing} of {changed} (repeats are not counted)")
+        ending = (
+            ""
+            if self.trustworthy
+            else "; the gradient is not trustworthy: most flights changed the error in the direction opposite to the "
+            "prediction"
+        )
+        counted = "; ".join(parts)
+        return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 
 def is_informative(lower: float | None, *, corrected: bool) -> bool:
@@ -84,8 +109,7 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
     """Compute the track record of the predictions that the flights carry.
 
     The direction counts where new gains were predicted to change the best error before them; repeated gains predict no
-    change. A prediction that is not informative is not counted. The predictions are not trustworthy once at least
-    three flights went in the other direction, and more than went in the predicted one.
+    change. A prediction that is not informative is not counted.
     """
     inside = of = agreeing = disagreeing = 0
     best: float | None = None
@@ -108,15 +132,7 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
             disagreeing += agreed < 0.0
         best = flight.error if best is None else min(best, flight.error)
         seen.add(gains)
-    trustworthy = not (disagreeing >= _DISAGREEMENTS and disagreeing > agreeing)
-    return TrackRecord(
-        inside=inside,
-        of=of,
-        agreeing=agreeing,
-        disagreeing=disagreeing,
-        trustworthy=trustworthy,
-        sentence=_sentence(inside, of, agreeing, disagreeing, trustworthy),
-    )
+    return TrackRecord(inside=inside, of=of, agreeing=agreeing, disagreeing=disagreeing)
 
 
 def prediction_of(proposal: Proposal) -> Prediction | None:
@@ -236,29 +252,6 @@ def _sample_outputs(experiment: ModelledExperiment, gains: Vector, base: Flight 
 def offset_sensitivity(experiment: Experiment) -> float:
     """Error caused by a constant offset of one unit of the output: 1 for a mean, the window for an integral."""
     return experiment.window_s if experiment.integrates else 1.0
-
-
-def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:
-    if not of and not agreeing + disagreeing:
-        return "No prediction has been tested by a flight yet."
-    parts = []
-    if of == 1:
-        parts.append(f"the only predicted flight ended {'inside' if inside else 'outside'} its interval")
-    elif of:
-        parts.append(f"{inside} of {of} flights ended inside their predicted interval")
-    if agreeing + disagreeing:
-        changed = (
-            f"{count(agreeing + disagreeing, 'flight')} with new gains changed the error in the predicted direction"
-        )
-        parts.append(f"{agreeing} of {changed} (repeats are not counted)")
-    ending = (
-        ""
-        if trustworthy
-        else "; the gradient is not trustworthy: most flights changed the error in the direction opposite to the "
-        "prediction"
-    )
-    counted = "; ".join(parts)
-    return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 
 _AT_ONCE: Final = 8
