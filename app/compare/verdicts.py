@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from app.campaigns.trials.views import CONFIDENCE
-from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named
+from app.compare.compared_flights import ComparisonFlight, capitalised, named
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.core.formatting import confidence_text, direction_of, format_gains
+from app.core.formatting import confidence_text, direction_of, format_gains, measured
 from app.core.statistics.comparisons import Comparison, Group, Verdict, compare, drift_of
 from app.core.tuning.confirmation import SCATTER_NOT_KNOWN, deciding_flights
 from app.fleet import service as fleet

@@ -156,8 +156,7 @@ def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
         return NOTHING
     if uncertainty is None or uncertainty <= 0:
         return f"{short(value)} {unit}".rstrip()
-    digits = decimals(uncertainty)
-    return f"{number(value, digits)} ± {number(uncertainty, digits)} {unit}".rstrip()
+    return plus_minus(value, uncertainty, unit)
 
 
 def gain(value: float, digits: int = GAIN_DIGITS) -> str:

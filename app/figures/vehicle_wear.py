@@ -47,7 +47,8 @@ class CalibrationFigure:
         return "The model's fitted parameters appear here once a campaign with the calibrated model has flown."
 
     def compute(self) -> Card:
-        palette, names = PALETTES[self.theme], self._names()
+        palette = PALETTES[self.theme]
+        names = [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
         axes: dict[str, object] = {}
         for index in range(1, len(names) + 1):
             axes |= self._axes(palette, index, len(names))
@@ -67,9 +68,6 @@ class CalibrationFigure:
             summary=f"Bars are 95 % intervals. {self.verdict}",
             table=self._table(names),
         )
-
-    def _names(self) -> list[str]:
-        return [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
 
     def _panel(self, palette: Palette, index: int, name: str) -> Trace:
         shown = [point for point in self.points if name in point.fitted]

@@ -6,7 +6,6 @@ from typing import Final
 
 from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.core.errors import Problem, TrajectoryError
-from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
 from app.core.records.trajectory import Trajectory
@@ -130,11 +129,10 @@ def _flight(analysis: TakeoffAnalysis) -> list[str]:
 
 def _vehicle(analysis: TakeoffAnalysis) -> list[str]:
     identified = [each for each in analysis.fitted if each.standard_error < _IDENTIFIED_SHARE * each.prior_sd]
-    return [*map(_fitted, identified), f"{analysis.residual_m:.3f} m of altitude unexplained"]
-
-
-def _fitted(each: FittedParameter) -> str:
-    return f"{each.title.lower()} {plus_minus(each.value, each.standard_error, each.unit)}"
+    return [
+        *(f"{each.title.lower()} {plus_minus(each.value, each.standard_error, each.unit)}" for each in identified),
+        f"{analysis.residual_m:.3f} m of altitude unexplained",
+    ]
 
 
 def _table(analysis: TakeoffAnalysis) -> GainsTable:

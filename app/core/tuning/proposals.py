@@ -14,7 +14,6 @@ from app.core.statistics.comparisons import Group
 from app.core.tuning.campaign_models import changed_parameters, known_distribution
 from app.core.tuning.confirmation import (
     NO_STEP,
-    Confirmation,
     compare_winner,
     confirm,
     describe_step,
@@ -223,10 +222,6 @@ def advise(
         effect = "" if now is None or tells_noise else describe_step(definition, experiment, flights, now, proposal)
         return Advice(kind=kind, gains=proposal.gains, why=effect or proposal.explanation.summary)
     confirmation = confirm(definition, experiment, flights, proposal)
-    kind = _kind(confirmation)
+    kind = "stop" if confirmation.phase == "decided" else confirmation.phase
     chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}
     return Advice(kind=kind, gains=dict(chosen.get(kind, now.winner.gains)), why=confirmation.why)
-
-
-def _kind(confirmation: Confirmation) -> AdviceKind:
-    return "stop" if confirmation.phase == "decided" else confirmation.phase

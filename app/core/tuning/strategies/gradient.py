@@ -7,7 +7,7 @@ A step that the gate would refuse is halved in the same way. With the option of 
 below the last successful step.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -95,11 +95,9 @@ def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vec
     return space.slopes(model.errors, base, np.where(whole, np.maximum(np.rint(wanted), MIN_DIFFERENCE), wanted))
 
 
-def _scaled_metric(space: PolicySpace) -> _Metric:
-    return _Metric(space.scale, SCALED_LADDER, "gain scale")
-
-
-def _raw_metric(space: PolicySpace) -> _Metric:
+def _metric(space: PolicySpace, *, scaled: bool) -> _Metric:
+    if scaled:
+        return _Metric(space.scale, SCALED_LADDER, "gain scale")
     whole = any(gain.integer for gain in space.gains)
     return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain unit")
 
@@ -121,7 +119,7 @@ def longest_step(space: PolicySpace, scale: Vector, flights: Sequence[Flight]) -
 def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
     """Propose the next gains on the line from the best flight. At least one flight must be valid."""
     definition, space, flights = evidence.definition, evidence.space, evidence.flights
-    metric = _scaled_metric(space) if definition.options.get("scaled", True) else _raw_metric(space)
+    metric = _metric(space, scaled=bool(definition.options.get("scaled", True)))
     limit = longest_step(space, metric.scale, flights) if definition.options.get("step_size") == "diminishing" else None
     if limit is not None:
         metric = replace(metric, ladder=(limit, *(length for length in metric.ladder if length < limit)))
@@ -143,6 +141,11 @@ def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
     chosen, refused = (
         _first_allowed_step(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
     )
+    notes = [correction, f"Step sizes are in {metric.unit}s: one is {format_gains(space.by_name(metric.scale))}."]
+    if limit is not None:
+        notes.append(f"After the last successful step this one is at most {metric.describe(limit)}.")
+    if refused:
+        notes.append(f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}.")
     explanation = Explanation(
         summary=_summary(evidence, best, chosen, metric, refused),
         base_flight=base.number,
@@ -151,7 +154,7 @@ def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
-        notes=(correction, _describe_unit(space, metric), *_describe_limit(metric, limit), *_notes(refused)),
+        notes=tuple(notes),
     )
     gains = space.mapping(base_gains) if chosen is None else chosen.gains
     kind: Kind = "none" if chosen is None else "step" if chosen is best else "shorter step"
@@ -176,7 +179,7 @@ def _first_allowed_step(
     base.
     """
     refused: list[LadderStep] = []
-    for length in _halvings(best.length):
+    for length in (best.length / 2**halvings for halvings in range(_HALVINGS)):
         gains = line.at(length)
         if np.array_equal(gains, line.base):
             break
@@ -187,10 +190,6 @@ def _first_allowed_step(
             return step, tuple(refused)
         refused.append(step)
     return None, tuple(refused)
-
-
-def _halvings(length: float) -> Iterator[float]:
-    return (length / 2**halvings for halvings in range(_HALVINGS))
 
 
 def _summary(
@@ -231,18 +230,6 @@ def _corrected(evidence: Evidence[ModelledExperiment]) -> tuple[CorrectedModel, 
         return inside, "The correction is added to the state in every step, inside the control loop."
     missing = f"flight {base.number} was recorded without all of its state and its command"
     return correct_by_bias(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
-
-
-def _describe_unit(space: PolicySpace, metric: _Metric) -> str:
-    return f"Step sizes are in {metric.unit}s: one is {format_gains(space.by_name(metric.scale))}."
-
-
-def _describe_limit(metric: _Metric, limit: float | None) -> tuple[str, ...]:
-    return () if limit is None else (f"After the last successful step this one is at most {metric.describe(limit)}.",)
-
-
-def _notes(refused: Sequence[LadderStep]) -> tuple[str, ...]:
-    return (f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}.",) if refused else ()
 
 
 GRADIENT: Final = Strategy(
