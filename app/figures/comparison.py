@@ -7,7 +7,7 @@ import numpy as np
 
 from app.core.formatting import short
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, literal, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Table, Trace, literal, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, Scored
 from app.figures.overlays import off_scale
 from app.figures.scale import robust_span, thin_by_bends, thinned
@@ -163,21 +163,16 @@ class ComparisonFigure:
 
     def _table(self, recorded: list[Drawn]) -> Table:
         data, first = self.data, self.data.flights[0].label
-        named = [(Column("set_point", "Set point", data.output_unit, 3), data.set_point)]
-        named += [
-            (Column(flight.label.lower(), f"{flight.label} · {flight.name}", data.output_unit, 3), curve)
-            for _, flight, curve in recorded
+        named = [
+            ("set_point", "Set point", data.set_point),
+            *((flight.label.lower(), f"{flight.label} · {flight.name}", curve) for _, flight, curve in recorded),
+            *(
+                (f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}", curve)
+                for _, flight, curve in self._differences(recorded)
+            ),
         ]
-        named += [
-            (
-                Column(f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}",
-                       data.output_unit, 3),
-                curve,
-            )
-            for _, flight, curve in self._differences(recorded)
-        ]  # fmt: skip
         seconds = np.linspace(0.0, float(data.set_point.time_s[-1]), TABLE_ROWS)
-        return table_of_curves(seconds.tolist(), 2, named)
+        return table_of_curves(seconds.tolist(), 2, data.output_unit, named)
 
 
 def line_style(palette: Palette, index: int) -> tuple[str, str]:

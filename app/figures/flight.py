@@ -10,7 +10,7 @@ import numpy as np
 
 from app.core.records.flight_events import FlightEvent
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, literal, ready, scatter, table_of_curves
+from app.figures.base import Card, Table, Trace, literal, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range, Scored
 from app.figures.deviations import deviation_axis, deviation_of, is_step, scored_deviation_limit, scored_part
 from app.figures.overlays import band_traces, glitch_traces
@@ -211,19 +211,16 @@ class FlightFigure:
 
     def _table(self, curve: Curve) -> Table:
         record = self.record
-        named = [
-            (Column("measured", "Measured", record.output_unit, 3), curve),
-            (Column("set_point", "Set point", record.output_unit, 3), record.set_point),
-        ]
+        named = [("measured", "Measured", curve), ("set_point", "Set point", record.set_point)]
         if record.predicted is not None:
-            named.append((Column("predicted", record.predicted_name, record.output_unit, 3), record.predicted))
-        named += [
-            (Column(title.lower().replace(" ", "_"), title, "", 3), channel)
+            named.append(("predicted", record.predicted_name, record.predicted))
+        channels = [
+            (title.lower().replace(" ", "_"), title, channel)
             for panel in record.panels
             for title, channel in panel.curves.items()
         ]
         seconds = np.linspace(float(curve.time_s[0]), float(curve.time_s[-1]), TABLE_ROWS)
-        return table_of_curves(seconds.tolist(), 2, named)
+        return table_of_curves(seconds.tolist(), 2, record.output_unit, named, channels)
 
 
 def _places(below: int) -> list[list[float]]:

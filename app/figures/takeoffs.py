@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final, cast
 
 from app.core.formatting import count, short
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History, Range
 from app.figures.deviations import (
     changes_of,
@@ -178,47 +178,48 @@ class TrajectoriesFigure:
             if part is not None
         ]
 
-    def _deviations(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
+    def _deviations(self, palette: Palette, drawn: list[FlightData]) -> Iterator[Trace]:
         """Output − target of each flight and of the prediction, in the lower panel."""
         if not is_step(self.history.set_point):
-            return []
-        unit, proposal = self.history.output_unit, self.history.proposal
+            return
+        proposal = self.history.proposal
         points = max(60, min(_DEVIATION_POINTS, ALL_POINTS // 3 // max(1, len(drawn))))
-        own = [
-            self._trace(
-                f"Flight {flight.number}, deviation",
-                deviation_of(flight.curve, self.history.target),
+
+        def deviation(name: str, title: str, curve: Curve, look: str, **more: Any) -> Trace:
+            return self._trace(
+                name,
+                deviation_of(curve, self.history.target),
                 points,
-                role="deviation",
-                about={"trial": flight.number, "standing": standing},
-                uid=f"deviation-{flight.number}",
-                line=_style(palette, standing),
-                legendgroup=standing,
+                line=_style(palette, look),
                 showlegend=False,
                 yaxis="y2",
-                hovertemplate=reading(f"Flight {flight.number}, deviation", unit, form="+.3f"),
+                hovertemplate=reading(title, self.history.output_unit, form="+.3f"),
+                **more,
             )
-            for flight in sorted(drawn, key=self._weight)
-            if flight.curve is not None
-            for standing in [self._standing(flight)]
-        ]
-        if proposal is None or proposal.curve is None:
-            return own
-        predicted = self._trace(
-            f"{proposal.curve_name}: deviation",
-            deviation_of(proposal.curve, self.history.target),
-            points,
-            role="predicted deviation",
-            about={"trial": proposal.number},
-            uid="predicted-deviation",
-            line=_style(palette, "prediction"),
-            showlegend=False,
-            yaxis="y2",
-            hovertemplate=reading(
-                f"Flight {proposal.number}, {proposal.curve_name.lower()}: deviation", unit, form="+.3f"
-            ),
-        )
-        return [*own, predicted]
+
+        for flight in sorted(drawn, key=self._weight):
+            if flight.curve is not None:
+                name, standing = f"Flight {flight.number}, deviation", self._standing(flight)
+                yield deviation(
+                    name,
+                    name,
+                    flight.curve,
+                    standing,
+                    role="deviation",
+                    about={"trial": flight.number, "standing": standing},
+                    uid=f"deviation-{flight.number}",
+                    legendgroup=standing,
+                )
+        if proposal is not None and proposal.curve is not None:
+            yield deviation(
+                f"{proposal.curve_name}: deviation",
+                f"Flight {proposal.number}, {proposal.curve_name.lower()}: deviation",
+                proposal.curve,
+                "prediction",
+                role="predicted deviation",
+                about={"trial": proposal.number},
+                uid="predicted-deviation",
+            )
 
     @property
     def _deviation_limit(self) -> float:
@@ -381,32 +382,30 @@ class TrajectoriesFigure:
         return f"{history.output_title} over time: {count(len(history.flights), 'flight')}.{found}{off}"
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
-        history, unit = self.history, self.history.output_unit
-        named: list[tuple[Column, Curve]] = [(Column("set_point", "Set point", unit, 3), history.set_point)]
+        history, proposal = self.history, self.history.proposal
+        named = [("set_point", "Set point", history.set_point)]
         if history.reference is not None:
-            named.append((Column("reference", "Reference", unit, 3), history.reference))
+            named.append(("reference", "Reference", history.reference))
         if envelope is not None:
             curves = (envelope.band.lower, envelope.median, envelope.band.upper)
             named += [
-                (
-                    Column(f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", unit, 3),
-                    curve,
-                )
+                (f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", curve)
                 for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
             ]
         named += [
-            (Column(f"flight_{flight.number}", f"Flight {flight.number}", unit, 3), flight.curve)
+            (f"flight_{flight.number}", f"Flight {flight.number}", flight.curve)
             for flight in drawn
             if flight.curve is not None
         ]
-        if history.proposal is not None and history.proposal.curve is not None:
-            title = f"Flight {history.proposal.number}, {history.proposal.curve_name.lower()}"
-            named.append((Column("prediction", title, unit, 3), history.proposal.curve))
-            if history.proposal.band is not None:
-                named.append((Column("prediction_lower", f"{title}, at least", unit, 3), history.proposal.band.lower))
-                named.append((Column("prediction_upper", f"{title}, at most", unit, 3), history.proposal.band.upper))
+        if proposal is not None and proposal.curve is not None:
+            title = f"Flight {proposal.number}, {proposal.curve_name.lower()}"
+            named.append(("prediction", title, proposal.curve))
+            if proposal.band is not None:
+                named.append(("prediction_lower", f"{title}, at least", proposal.band.lower))
+                named.append(("prediction_upper", f"{title}, at most", proposal.band.upper))
         lasts = float(history.set_point.time_s[-1])
-        return table_of_curves([time_s for time_s in TABLE_TIMES_S if time_s <= lasts], 1, named)
+        times_s = [time_s for time_s in TABLE_TIMES_S if time_s <= lasts]
+        return table_of_curves(times_s, 1, history.output_unit, named)
 
 
 def _with_uids(traces: list[Trace]) -> list[Trace]:
