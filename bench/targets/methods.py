@@ -25,9 +25,9 @@ from app.core.tuning.corrected_model import start_gains
 from app.core.tuning.definition_checks import check_definition
 from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
-from app.core.tuning.predictions import prediction_of
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies import STRATEGIES, gradient
+from bench.predictions import prediction_of
 from bench.targets.flying import EXPERIMENT, SPACE, Method, Tuning
 
 if TYPE_CHECKING:

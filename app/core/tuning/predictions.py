@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Flight, Prediction
+from app.core.definition import Flight
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, normal_distribution
 from app.core.formatting import count
 from app.core.models.vertical import ENTERED
@@ -133,18 +133,6 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
         best = flight.error if best is None else min(best, flight.error)
         seen.add(gains)
     return TrackRecord(inside=inside, of=of, agreeing=agreeing, disagreeing=disagreeing)
-
-
-def prediction_of(proposal: Proposal) -> Prediction | None:
-    """The prediction stored with a flight of the proposal, for later comparison."""
-    if proposal.predicted_error is None:
-        return None
-    interval = proposal.interval
-    return Prediction(
-        error=proposal.predicted_error,
-        lower=None if interval is None else interval.lower,
-        upper=None if interval is None else interval.upper,
-    )
 
 
 def with_interval(evidence: Evidence[ModelledExperiment], proposal: Proposal, *, base: Flight | None) -> Proposal:

@@ -9,8 +9,9 @@ from scipy import stats
 from app.core.definition import Definition, Flight, Prediction
 from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
-from app.core.tuning.predictions import interval_scale, prediction_of, repeat_proposal, track_record, with_interval
+from app.core.tuning.predictions import interval_scale, repeat_proposal, track_record, with_interval
 from app.core.tuning.strategy import Explanation, Proposal, proposal_of
+from bench.predictions import prediction_of
 from tests.core.tuning.bowl import OFFSET, QuadraticExperiment, fly
 from tests.core.tuning.defined import evidence
 

@@ -12,11 +12,12 @@ from app.core.definition import Definition, Flight, Prediction, StopRule
 from app.core.formatting import short
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.predictions import predict_flight, prediction_of, remaining_bias
+from app.core.tuning.predictions import predict_flight, remaining_bias
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.calibrated import CALIBRATED, propose
 from app.core.tuning.strategy import Proposal
 from app.core.tuning.trust_region import Box, find_robust_optimum, merit
+from bench.predictions import prediction_of
 from tests.core.tuning.bowl import QuadraticExperiment
 from tests.core.tuning.bowl import fly as fly_bowl
 from tests.core.tuning.defined import evidence, next_proposal
