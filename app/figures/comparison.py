@@ -98,11 +98,11 @@ class ComparisonFigure:
         first = data.flights[0].label
         return theme.layout(
             palette,
-            xaxis=theme.titled(palette, "Time since the command (s)", anchor="y2", range=[-0.01 * end, end]),
-            yaxis=theme.titled(
+            xaxis=theme.axis(palette, "Time since the command (s)", anchor="y2", range=[-0.01 * end, end]),
+            yaxis=theme.axis(
                 palette, f"{data.output_title} ({data.output_unit})", domain=[0.4, 1.0], range=[low, high], nticks=7
             ),
-            yaxis2=theme.titled(
+            yaxis2=theme.axis(
                 palette,
                 f"Difference from {first} ({data.output_unit})",
                 domain=[0.0, 0.32],

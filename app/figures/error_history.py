@@ -62,13 +62,13 @@ class ErrorsFigure:
         traces += off_scale_traces(palette, outside, span.high, history.error_unit, last=last, crowded=self._is_crowded)
         layout = theme.layout(
             palette,
-            xaxis=theme.titled(
+            xaxis=theme.axis(
                 palette,
                 "Flight",
                 anchor="y2" if strip else "y",
                 **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]},
             ),
-            yaxis=theme.titled(
+            yaxis=theme.axis(
                 palette,
                 f"Error ({history.error_unit})",
                 domain=[STRIP + _STRIP_GAP if strip else 0.0, 1.0],
@@ -229,17 +229,15 @@ class ErrorsFigure:
         """The error beside each mark, clear of the steps; with many flights only the best."""
         flights, best = self.history.valid, self.history.best
         return [
-            {
-                "x": flight.number,
-                "y": flight.error,
-                "text": formatting.short(flight.error),
-                "showarrow": False,
-                "xanchor": "left",
-                "xshift": 6,
-                "yshift": 13,
-                "font": {"size": 12, "color": palette.best if flight is best else palette.ink},
+            theme.label(
+                formatting.short(flight.error),
+                palette.best if flight is best else palette.ink,
+                x=flight.number,
+                y=flight.error,
+                xshift=6,
+                yshift=13,
                 **({"bgcolor": palette.surface, "borderpad": 1} if self._is_crowded else {}),
-            }
+            )
             for flight in flights
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]

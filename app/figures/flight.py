@@ -136,16 +136,16 @@ class FlightFigure:
         )
         places = _places(len(record.panels) + self._has_deviation)
         output = f"{record.output_title} ({record.output_unit})"
-        axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=places[0], range=[low, high])}
+        axes: dict[str, object] = {"yaxis": theme.axis(palette, output, domain=places[0], range=[low, high])}
         if self._has_deviation:
             axes["yaxis2"] = deviation_axis(
                 palette, scored_deviation_limit(curve, record.target, goal), record.output_unit, domain=places[1]
             )
         for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
-            axes[f"yaxis{place}"] = theme.titled(palette, panel.title, domain=places[place - 1], nticks=4)
+            axes[f"yaxis{place}"] = theme.axis(palette, panel.title, domain=places[place - 1], nticks=4)
         lasts_s = float(goal.time_s[-1])
         begin = min(float(curve.time_s[0]), -_FIRST_NAME * lasts_s) - 0.01 * lasts_s
-        axes["xaxis"] = theme.titled(
+        axes["xaxis"] = theme.axis(
             palette,
             "Time since the command (s)",
             anchor=f"y{theme.suffix(len(places))}",
@@ -164,8 +164,8 @@ class FlightFigure:
             hovermode="x unified",
             hoversubplots="axis",
             shapes=[
-                *(_mark(event, palette.dim) for event in record.events),
-                *(_mark(note, palette.prediction) for note in record.notes),
+                *(theme.upright(event.time_s, palette.dim, 1, yref="paper") for event in record.events),
+                *(theme.upright(note.time_s, palette.prediction, 1, yref="paper") for note in record.notes),
             ],
             annotations=[
                 *_names(palette, record.events, lasts_s),
@@ -255,20 +255,6 @@ def _saturated(palette: Palette, command: Curve, limits: Range) -> Iterator[Trac
     )
 
 
-def _mark(event: FlightEvent, colour: str) -> dict[str, object]:
-    """A vertical line through all panels."""
-    return {
-        "type": "line",
-        "x0": event.time_s,
-        "x1": event.time_s,
-        "y0": 0,
-        "y1": 1,
-        "yref": "paper",
-        "layer": "below",
-        "line": {"color": colour, "width": 1, "dash": "dot"},
-    }
-
-
 def _names(palette: Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
     """The events' names along their lines: the first at the left of its line, the others at the right, over the curves.
 
@@ -296,16 +282,7 @@ def _note(palette: Palette, note: FlightEvent, bottom: float) -> dict[str, objec
 
 
 def _along(time_s: float, text: str, colour: str, **place: object) -> dict[str, object]:
-    return {
-        "text": text,
-        "x": time_s,
-        "yref": "paper",
-        "xanchor": "left",
-        "textangle": -90,
-        "showarrow": False,
-        "font": {"size": 12, "color": colour},
-        **place,
-    }
+    return theme.label(text, colour, **{"x": time_s, "yref": "paper", "textangle": -90, **place})
 
 
 def _line(

@@ -182,7 +182,7 @@ class LandscapeFigure:
         suffix = theme.suffix(index)
         axes = (("x", "y", one.x, one.x_values, across, 5), ("y", "x", one.y, one.y_values, up, 6))
         return {
-            f"{own}axis{suffix}": theme.titled(
+            f"{own}axis{suffix}": theme.axis(
                 palette,
                 _title(named[gain]),
                 domain=place,

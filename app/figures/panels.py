@@ -116,7 +116,7 @@ class PanelsFigure:
         place = theme.stacked(number, count, GAP)
         return {
             f"xaxis{suffix}": theme.shared_axis(palette, self.plot.x_title, number, count, **x),
-            f"yaxis{suffix}": theme.titled(
+            f"yaxis{suffix}": theme.axis(
                 palette, panel.y_title, anchor=f"x{suffix}", domain=place, nticks=7 if count == 1 else 4, **y
             ),
         }

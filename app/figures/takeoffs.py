@@ -152,12 +152,10 @@ class TrajectoriesFigure:
         both = is_step(history.set_point)
         place = [DEVIATION_SHARE + _PANEL_GAP, 1.0] if both else [0.0, 1.0]
         axes: dict[str, object] = {
-            "xaxis": theme.titled(
+            "xaxis": theme.axis(
                 palette, "Time since the command (s)", range=self._opening_s, anchor="y2" if both else "y"
             ),
-            "yaxis": theme.titled(
-                palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7
-            ),
+            "yaxis": theme.axis(palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7),
         }
         if both:
             axes["yaxis2"] = deviation_axis(palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])

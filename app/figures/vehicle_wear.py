@@ -108,19 +108,10 @@ class CalibrationFigure:
     def _tuned(self, palette: Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
+        suffixes = map(theme.suffix, range(1, panels + 1))
         return [
-            {
-                "type": "line",
-                "xref": f"x{theme.suffix(index)}",
-                "yref": f"y{theme.suffix(index)} domain",
-                "x0": self.since,
-                "x1": self.since,
-                "y0": 0,
-                "y1": 1,
-                "layer": "below",
-                "line": {"color": palette.prediction, "width": 1.5, "dash": "dot"},
-            }
-            for index in range(1, panels + 1)
+            theme.upright(self.since, palette.prediction, 1.5, xref=f"x{suffix}", yref=f"y{suffix} domain")
+            for suffix in suffixes
         ]
 
     def _table(self, names: list[str]) -> Table:
@@ -175,12 +166,12 @@ class BatteriesFigure:
         layout = theme.layout(
             palette,
             uirevision="batteries",
-            xaxis=theme.titled(
+            xaxis=theme.axis(
                 palette,
                 "Flight of this vehicle",
                 **theme.flight_ticks(len(self.flights)),
             ),
-            yaxis=theme.titled(palette, "Voltage (V)"),
+            yaxis=theme.axis(palette, "Voltage (V)"),
         )
         columns = (
             Column("flight", "Flight of the vehicle", digits=0),
