@@ -20,7 +20,7 @@ def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -
     with reading(file, ANALYSED):
         beside = companion_of(file)
         content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
-    answer = analyze_content(content, companion, file.name).answer
+    answer, _ = analyze_content(content, companion, file.name)
     _print(console(json_out), answer)
     write_json(json_out, answer.model_dump(mode="json"))
     if params_out is not None:

@@ -18,17 +18,12 @@ from app.common.schemas import OptionValue
 from app.compare.schemas import FlightDifference, FlightSetting
 from app.core.definition import Option, with_defaults
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains, plus_minus, short
+from app.core.formatting import count, format_gains
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.registry import VEHICLE_KINDS
-
-
-def measured(value: float, standard_error: float | None, unit: str) -> str:
-    """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; the value alone if it has none."""
-    return plus_minus(value, standard_error, unit) if standard_error else f"{short(value)} {unit}"
 
 
 def named(group: Group, name: str) -> str:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from app.campaigns.trials.views import CONFIDENCE
-from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named
+from app.compare.compared_flights import ComparisonFlight, capitalised, named
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.core.formatting import confidence_text, count, format_gains
+from app.core.formatting import confidence_text, direction_of, format_gains, measured
 from app.core.statistics.comparisons import Comparison, Group, Verdict, compare, drift_of
-from app.core.tuning.confirmation import SCATTER_NOT_KNOWN
+from app.core.tuning.confirmation import SCATTER_NOT_KNOWN, deciding_flights
 from app.fleet import service as fleet
 
 
@@ -145,12 +145,12 @@ def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other:
     """Compare two means with different scatters: the difference has the sum of both variances."""
     difference = own.mean - other.mean
     known = side.scatter.known and against.scatter.known
-    apart = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
-    standard_error = apart if known else None
+    uncertainty = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
+    standard_error = uncertainty if known else None
     amount = measured(abs(difference), standard_error, side.experiment.error_unit)
-    direction = "lower" if difference < 0.0 else "higher"
     how, _ = _why_apart(side, against)
-    sentence = f"No verdict on the gains: {side.name}, {how}, is {amount} {direction} than {against.name}."
+    apart = f"{amount} {direction_of(difference)} than {against.name}"
+    sentence = f"No verdict on the gains: {side.name}, {how}, is {apart}."
     return _pair(side, against, "apart", sentence, difference=difference, standard_error=standard_error)
 
 
@@ -203,20 +203,16 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
 def _changed(side: ComparisonFlight, against: ComparisonFlight, comparison: Comparison) -> str:
     """Sentence for the same gains in two campaigns."""
     amount = measured(abs(comparison.difference), comparison.standard_error, side.experiment.error_unit)
+    apart = f"{side.name} is {amount} {direction_of(comparison.difference)} than {against.name}"
     if comparison.confidence is None:
-        return (
-            f"Not known yet: with the same gains in two campaigns {side.name} is {amount} "
-            f"{_direction(comparison)} than {against.name}. {SCATTER_NOT_KNOWN}"
-        )
+        return f"Not known yet: with the same gains in two campaigns {apart}. {SCATTER_NOT_KNOWN}"
     relation = (
         "within the scatter"
         if comparison.verdict == "unresolved"
         else "more than the scatter: the vehicle or its environment has changed"
     )
-    return (
-        f"The same gains in two campaigns: {side.name} is {amount} {_direction(comparison)} than {against.name}, "
-        f"{relation} ({confidence_text(comparison.confidence)} confidence)."
-    )
+    sure = confidence_text(comparison.confidence)
+    return f"The same gains in two campaigns: {apart}, {relation} ({sure} confidence)."
 
 
 def _comparison_sentence(
@@ -225,24 +221,9 @@ def _comparison_sentence(
     amount = measured(abs(comparison.difference), comparison.standard_error, side.experiment.error_unit)
     pair = f"{named(own, side.name)} against {named(other, against.name)}"
     if comparison.confidence is None:
-        return f"Not known yet: {pair}, {amount} {_direction(comparison)}. {SCATTER_NOT_KNOWN}"
-    both = f"{amount} {_direction(comparison)}, {confidence_text(comparison.confidence)} confidence"
+        return f"Not known yet: {pair}, {amount} {direction_of(comparison.difference)}. {SCATTER_NOT_KNOWN}"
+    both = f"{amount} {direction_of(comparison.difference)}, {confidence_text(comparison.confidence)} confidence"
     if comparison.verdict == "unresolved":
-        return f"Unresolved: {pair}, {both}. {_deciding(side, against, comparison)}"
+        whose = f"with the gains of {side.name}", f"with the gains of {against.name}"
+        return f"Unresolved: {pair}, {both}. {deciding_flights(comparison, *whose, ' and ')}"
     return f"{capitalised(named(own, side.name))} is {comparison.verdict} than {named(other, against.name)}: {both}."
-
-
-def _direction(comparison: Comparison) -> str:
-    return "lower" if comparison.difference < 0.0 else "higher"
-
-
-def _deciding(side: ComparisonFlight, against: ComparisonFlight, comparison: Comparison) -> str:
-    if comparison.further is None:
-        return "Even 100 more flights would not resolve it."
-    parts = [
-        f"{count} with the gains of {name}"
-        for count, name in ((comparison.further.first, side.name), (comparison.further.second, against.name))
-        if count
-    ]
-    needed = count(comparison.further.total, "more flight")
-    return f"If the difference persists, {needed} would resolve it: {' and '.join(parts)}."

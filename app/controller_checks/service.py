@@ -15,7 +15,7 @@ from app.db.base import added
 from app.db.models import ControllerCheckRow
 from app.db.pages import Order, page_of
 from app.figures.base import Card, card_of
-from app.figures.panels import ControllerFigure
+from app.figures.panels import PanelsFigure, replica_plot
 from app.figures.theme import ThemeName
 from app.processes.sandbox import FILE, run_limited
 from app.reproductions.controller import RECORDED_TAKEOFF
@@ -131,8 +131,11 @@ def figure(session: Session, check_id: int, name: FigureName, theme: ThemeName) 
         if signal.name in signals
     )
     drawn = [result.curves[signal] for signal in signals if signal in result.curves]
+    if not drawn:
+        missing = "The log contains no command that could be simulated again."
+        return Card(name="controller", title=title, state="waiting", reason=missing)
     described = f"Recorded and replica overlaid: {summary}. {check.note}"
-    return card_of(ControllerFigure(drawn, title, described, theme))
+    return card_of(PanelsFigure(replica_plot(drawn, title, described), theme))
 
 
 def delete_check(session: Session, check_id: int) -> None:

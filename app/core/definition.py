@@ -160,12 +160,11 @@ class Option:
 
     def refusal(self, value: OptionValue) -> str | None:
         """Why `value` is not allowed, or None if it is."""
-        return self._not_a_choice(value) if self.choices else self._no_number(value)
-
-    def _not_a_choice(self, value: OptionValue) -> str | None:
-        if any(value == choice and type(value) is type(choice) for choice in self.choices):
-            return None
-        return f"must be one of {', '.join(str(choice).lower() for choice in self.choices)}, got {value!r}"
+        if self.choices:
+            if any(value == choice and type(value) is type(choice) for choice in self.choices):
+                return None
+            return f"must be one of {', '.join(str(choice).lower() for choice in self.choices)}, got {value!r}"
+        return self._no_number(value)
 
     def _no_number(self, value: OptionValue) -> str | None:
         if isinstance(value, bool) or not isinstance(value, int | float):

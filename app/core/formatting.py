@@ -70,11 +70,12 @@ def relative_to(value: float, base: float) -> str:
     change = value / base - 1.0
     if abs(change) < 0.005:
         return "the same"
-    return (
-        f"{value / base:.2g} times as high"
-        if change > 1.0
-        else f"{percent(abs(change))} {'lower' if change < 0.0 else 'higher'}"
-    )
+    return f"{value / base:.2g} times as high" if change > 1.0 else f"{percent(abs(change))} {direction_of(change)}"
+
+
+def direction_of(difference: float) -> str:
+    """`lower` or `higher`."""
+    return "lower" if difference < 0.0 else "higher"
 
 
 def short_percent(share: float) -> str:
@@ -155,8 +156,7 @@ def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
         return NOTHING
     if uncertainty is None or uncertainty <= 0:
         return f"{short(value)} {unit}".rstrip()
-    digits = decimals(uncertainty)
-    return f"{number(value, digits)} ± {number(uncertainty, digits)} {unit}".rstrip()
+    return plus_minus(value, uncertainty, unit)
 
 
 def gain(value: float, digits: int = GAIN_DIGITS) -> str:

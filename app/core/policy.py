@@ -1,7 +1,7 @@
 """Policies: named gain vectors, and the space from which a campaign may choose them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -174,6 +174,15 @@ class PolicySpace:
             gain.name: abs(one[gain.name] - other[gain.name]) / (gain.span or max(abs(gain.upper), 1.0))
             for gain in self.gains
         }
+
+    def slopes(self, values_of: Callable[[Vector], Vector], at: Vector, steps: Vector) -> Vector:
+        """Derivatives of a quantity with respect to each gain, shape (n,): central differences within the bounds, zero
+        where these pin a gain. `at` lies within the bounds; `values_of` takes gains of shape (2n, n), returns (2n,).
+        """
+        above, below = np.minimum(at + np.diag(steps), self.upper), np.maximum(at - np.diag(steps), self.lower)
+        values = values_of(np.concatenate((above, below)))
+        rise, run = values[: len(at)] - values[len(at) :], np.diag(above - below)
+        return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
 
     def narrowed(self, bounds: Mapping[str, tuple[float, float]]) -> "PolicySpace":
         """The same space with tighter bounds. Raises InputError if they are reversed or extend outside."""

@@ -134,13 +134,22 @@ def reading(title: str, unit: str, note: str = "", *, form: str = ".3f") -> str:
     return f"<b>{title}</b><br>{values}{note}<extra></extra>"
 
 
-def table_of_curves(times_s: Sequence[float], digits: int, curves: Sequence[tuple[Column, Curve]]) -> Table:
-    """The curves' values at these times, of which `digits` decimals are shown."""
+NamedCurve = tuple[str, str, Curve]
+"""A curve of a table, with the name and the title of its column."""
+
+
+def table_of_curves(
+    times_s: Sequence[float], digits: int, unit: str, curves: Sequence[NamedCurve], others: Sequence[NamedCurve] = ()
+) -> Table:
+    """The values of curves in a unit, and of others without one, at these times, of which `digits` decimals are
+    shown."""
+    columns = [Column(name, title, unit, 3) for name, title, _ in curves]
+    columns += [Column(name, title, "", 3) for name, title, _ in others]
     rows = []
     for time_s in times_s:
-        values = [curve.at(time_s) for _, curve in curves]
+        values = [curve.at(time_s) for *_, curve in (*curves, *others)]
         rows.append((round(time_s, digits), *(None if value is None else round(value, 4) for value in values)))
-    return Table((Column("time_s", "Time", "s", digits), *(column for column, _ in curves)), tuple(rows))
+    return Table((Column("time_s", "Time", "s", digits), *columns), tuple(rows))
 
 
 def literal(text: str) -> str:

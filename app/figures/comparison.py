@@ -7,8 +7,8 @@ import numpy as np
 
 from app.core.formatting import short
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, literal, reading, ready, scatter, table_of_curves
-from app.figures.data import Curve
+from app.figures.base import Card, Table, Trace, literal, reading, ready, scatter, table_of_curves
+from app.figures.data import Curve, Scored
 from app.figures.overlays import off_scale
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -34,14 +34,11 @@ Drawn = tuple[int, ComparedCurve, Curve]
 """A flight with its index among all flights, and its curve."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ComparisonData:
+@dataclass(frozen=True, kw_only=True)
+class ComparisonData(Scored):
     """At least two flights, at most 36, the number of combinations of colour and dash."""
 
-    output_title: str
-    output_unit: str
     error_unit: str
-    set_point: Curve
     flights: tuple[ComparedCurve, ...]
 
 
@@ -101,11 +98,11 @@ class ComparisonFigure:
         first = data.flights[0].label
         return theme.layout(
             palette,
-            xaxis=theme.titled(palette, "Time since the command (s)", anchor="y2", range=[-0.01 * end, end]),
-            yaxis=theme.titled(
+            xaxis=theme.axis(palette, "Time since the command (s)", anchor="y2", range=[-0.01 * end, end]),
+            yaxis=theme.axis(
                 palette, f"{data.output_title} ({data.output_unit})", domain=[0.4, 1.0], range=[low, high], nticks=7
             ),
-            yaxis2=theme.titled(
+            yaxis2=theme.axis(
                 palette,
                 f"Difference from {first} ({data.output_unit})",
                 domain=[0.0, 0.32],
@@ -166,21 +163,16 @@ class ComparisonFigure:
 
     def _table(self, recorded: list[Drawn]) -> Table:
         data, first = self.data, self.data.flights[0].label
-        named = [(Column("set_point", "Set point", data.output_unit, 3), data.set_point)]
-        named += [
-            (Column(flight.label.lower(), f"{flight.label} · {flight.name}", data.output_unit, 3), curve)
-            for _, flight, curve in recorded
+        named = [
+            ("set_point", "Set point", data.set_point),
+            *((flight.label.lower(), f"{flight.label} · {flight.name}", curve) for _, flight, curve in recorded),
+            *(
+                (f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}", curve)
+                for _, flight, curve in self._differences(recorded)
+            ),
         ]
-        named += [
-            (
-                Column(f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}",
-                       data.output_unit, 3),
-                curve,
-            )
-            for _, flight, curve in self._differences(recorded)
-        ]  # fmt: skip
         seconds = np.linspace(0.0, float(data.set_point.time_s[-1]), TABLE_ROWS)
-        return table_of_curves(seconds.tolist(), 2, named)
+        return table_of_curves(seconds.tolist(), 2, data.output_unit, named)
 
 
 def line_style(palette: Palette, index: int) -> tuple[str, str]:

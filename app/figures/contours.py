@@ -105,10 +105,9 @@ def _crossed(errors: _Points, along: _Points, line: _Points, level: float) -> _P
 
 def contour_traces(
     palette: Palette, index: int, one: Slice, scale: Scale, unit: str, taken: Sequence[Box]
-) -> list[Trace]:
+) -> Iterator[Trace]:
     """The contours, a shade over errors above the scale, and the labels, clear of what is `taken`."""
-    suffix = theme.suffix(index)
-    axes: dict[str, object] = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+    axes = theme.on(index)
     common: dict[str, object] = axes | {
         "type": "contour",
         "x": list(one.x_values),
@@ -137,7 +136,9 @@ def contour_traces(
         "hoverinfo": "skip",
         "meta": {"role": "beyond", "slice": index},
     }
-    return [ground, beyond, _label_trace(palette, index, one, list(place_labels(one, scale, taken))) | axes]
+    yield ground
+    yield beyond
+    yield _label_trace(palette, index, one, list(place_labels(one, scale, taken))) | axes
 
 
 def _label_trace(palette: Palette, index: int, one: Slice, labels: Sequence[Label]) -> Trace:

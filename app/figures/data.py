@@ -117,16 +117,27 @@ class Noise:
     best_numbers: tuple[int, ...] = ()
 
 
-def target_of(set_point: Curve, reference: Curve | None, *, by_reference: bool) -> Curve:
-    """What an output is scored against: the reference if the experiment asks for it and there is one."""
-    return reference if by_reference and reference is not None else set_point
+@dataclass(frozen=True, kw_only=True)
+class Scored:
+    """A scored output, with its set point and the reference if there is one. `by_reference`: it is scored against the
+    reference, not against the set point."""
+
+    output_title: str
+    output_unit: str
+    set_point: Curve
+    reference: Curve | None = None
+    by_reference: bool = False
+
+    @property
+    def target(self) -> Curve:
+        """What the output is scored against."""
+        return self.reference if self.by_reference and self.reference is not None else self.set_point
 
 
 @dataclass(frozen=True, kw_only=True)
-class History:
+class History(Scored):
     """A campaign's data for its figures.
 
-    `by_reference`: the output is scored against the reference, not against the set point.
     `stop_improvement` is the share of the best error by which a flight must be lower to count as an improvement, None
     if the stop rule has no such condition. `flights` are in the order of their numbers. `noise` is None while it is not
     known. `window` is the visible time range, s, which is drawn with more points; None for all. `chosen` is the number
@@ -134,26 +145,16 @@ class History:
     there is no such limit.
     """
 
-    output_title: str
-    output_unit: str
     error_unit: str
     gains: tuple[Gain, ...]
-    set_point: Curve
-    reference: Curve | None
     flights: tuple[FlightData, ...]
     proposal: NextFlight | None = None
     stop_improvement: float | None = None
     noise: Noise | None = None
-    by_reference: bool = False
     curves_title: str = "Takeoff curves"
     window: Range | None = None
     chosen: int | None = None
     altitude_limit_m: float | None = None
-
-    @property
-    def target(self) -> Curve:
-        """What the output is scored against."""
-        return target_of(self.set_point, self.reference, by_reference=self.by_reference)
 
     @cached_property
     def valid(self) -> tuple[FlightData, ...]:

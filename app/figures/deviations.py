@@ -177,7 +177,7 @@ def _trace(palette: Palette, mark: _Mark, label: _Label | None, limit: float, un
 
 def deviation_axis(palette: Palette, limit: float, unit: str, **more: object) -> dict[str, object]:
     """The ordinate of the panel, from −limit to limit."""
-    return theme.titled(
+    return theme.axis(
         palette,
         f"Deviation ({unit})",
         range=[-limit, limit],

@@ -1,5 +1,6 @@
 """The error of each flight: measured, predicted, best so far, and the threshold for the next one."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
@@ -61,13 +62,13 @@ class ErrorsFigure:
         traces += off_scale_traces(palette, outside, span.high, history.error_unit, last=last, crowded=self._is_crowded)
         layout = theme.layout(
             palette,
-            xaxis=theme.titled(
+            xaxis=theme.axis(
                 palette,
                 "Flight",
                 anchor="y2" if strip else "y",
                 **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]},
             ),
-            yaxis=theme.titled(
+            yaxis=theme.axis(
                 palette,
                 f"Error ({history.error_unit})",
                 domain=[STRIP + _STRIP_GAP if strip else 0.0, 1.0],
@@ -105,28 +106,26 @@ class ErrorsFigure:
         high = max(first, default=min(errors))
         return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
 
-    def _measured(self, palette: Palette) -> list[Trace]:
+    def _measured(self, palette: Palette) -> Iterator[Trace]:
         flights, best = self.history.valid, self.history.best
         if not flights:
-            return []
+            return
         colours = [palette.best if flight is best else palette.ink for flight in flights]
         size = 4 if self._is_crowded else 8
-        return [
-            scatter(
-                "Measured",
-                ([flight.number for flight in flights], [_rounded(flight.error) for flight in flights]),
-                role="measured",
-                mode="markers",
-                cliponaxis=False,
-                **self._error_bars(palette),
-                marker=theme.solid(
-                    colours,
-                    size=[13 if flight is best else size for flight in flights],
-                    symbol=["star" if flight is best else "circle" for flight in flights],
-                ),
-                hovertemplate=f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
-            )
-        ]
+        yield scatter(
+            "Measured",
+            ([flight.number for flight in flights], [_rounded(flight.error) for flight in flights]),
+            role="measured",
+            mode="markers",
+            cliponaxis=False,
+            **self._error_bars(palette),
+            marker=theme.solid(
+                colours,
+                size=[13 if flight is best else size for flight in flights],
+                symbol=["star" if flight is best else "circle" for flight in flights],
+            ),
+            hovertemplate=f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
+        )
 
     @property
     def _is_crowded(self) -> bool:
@@ -145,80 +144,74 @@ class ErrorsFigure:
         bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
         return {"error_y": bar}
 
-    def _noise(self, palette: Palette, last: int) -> list[Trace]:
+    def _noise(self, palette: Palette, last: int) -> Iterator[Trace]:
         """Range in which another flight of the best gains would lie: a result inside it is not significant."""
         noise = self.history.noise
         if noise is None or noise.around_best is None:
-            return []
+            return
         low, high = round(max(0.0, noise.around_best.low), 6), round(noise.around_best.high, 6)
         right = last + 0.95
-        return [
-            scatter(
-                "Scatter of best" if noise.repeats else "Scatter (prior)",
-                ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
-                role="noise",
-                line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
-                fill="toself",
-                fillcolor=theme.with_opacity(palette.best, 0.12),
-            )
-        ]
+        yield scatter(
+            "Scatter of best" if noise.repeats else "Scatter (prior)",
+            ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
+            role="noise",
+            line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
+            fill="toself",
+            fillcolor=theme.with_opacity(palette.best, 0.12),
+        )
 
-    def _repeats(self, palette: Palette) -> list[Trace]:
+    def _repeats(self, palette: Palette) -> Iterator[Trace]:
         """Mean of flights with the same gains, with its standard error, beside the last of them."""
         repeats = () if self.history.noise is None else self.history.noise.repeats
         if not repeats:
-            return []
+            return
         unit = self.history.error_unit
-        return [
-            scatter(
-                "Mean of repeats",
-                ([max(group.numbers) + 0.22 for group in repeats], [round(group.mean, 6) for group in repeats]),
-                role="repeats",
-                mode="markers",
-                text=[
-                    f"{formatting.named_flights(group.numbers).capitalize()}<br>"
-                    f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit} (standard error)"
-                    for group in repeats
-                ],
-                error_y={
-                    "type": "data",
-                    "array": [round(group.standard_error, 6) for group in repeats],
-                    "color": palette.best,
-                    "thickness": 3,
-                    "width": 0,
-                },
-                marker=theme.solid(palette.best, size=9, symbol="square"),
-                cliponaxis=False,
-                hovertemplate="<b>%{text}</b><extra></extra>",
-            )
-        ]
+        yield scatter(
+            "Mean of repeats",
+            ([max(group.numbers) + 0.22 for group in repeats], [round(group.mean, 6) for group in repeats]),
+            role="repeats",
+            mode="markers",
+            text=[
+                f"{formatting.named_flights(group.numbers).capitalize()}<br>"
+                f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit} (standard error)"
+                for group in repeats
+            ],
+            error_y={
+                "type": "data",
+                "array": [round(group.standard_error, 6) for group in repeats],
+                "color": palette.best,
+                "thickness": 3,
+                "width": 0,
+            },
+            marker=theme.solid(palette.best, size=9, symbol="square"),
+            cliponaxis=False,
+            hovertemplate="<b>%{text}</b><extra></extra>",
+        )
 
-    def _intervals(self, palette: Palette, top: float) -> list[Trace]:
+    def _intervals(self, palette: Palette, top: float) -> Iterator[Trace]:
         """Predicted interval of each flight's error, or only the next one's if there are many.
 
         A bar behind the diamond of the prediction, cut at the edge.
         """
         known = self._expected()
         if not known and self.history.proposal is None:
-            return []
+            return
         x, y, text = [], [], []
         for number, interval in known:
             x += [number, number, None]
             y += [round(max(0.0, interval.low), 6), round(min(1.08 * top, interval.high), 6), None]
             text += 3 * [f"{interval.low:.4f} … {interval.high:.4f}"]
-        return [
-            scatter(
-                "90 % interval",
-                (x, y),
-                role="interval",
-                about=self._next,
-                visible=bool(known),
-                text=text,
-                line=theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
-                connectgaps=False,
-                hovertemplate=f"<b>Flight %{{x}}</b><br>predicted %{{text}} {self.history.error_unit}<extra></extra>",
-            )
-        ]
+        yield scatter(
+            "90 % interval",
+            (x, y),
+            role="interval",
+            about=self._next,
+            visible=bool(known),
+            text=text,
+            line=theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
+            connectgaps=False,
+            hovertemplate=f"<b>Flight %{{x}}</b><br>predicted %{{text}} {self.history.error_unit}<extra></extra>",
+        )
 
     @property
     def _next(self) -> dict[str, object]:
@@ -236,17 +229,15 @@ class ErrorsFigure:
         """The error beside each mark, clear of the steps; with many flights only the best."""
         flights, best = self.history.valid, self.history.best
         return [
-            {
-                "x": flight.number,
-                "y": flight.error,
-                "text": formatting.short(flight.error),
-                "showarrow": False,
-                "xanchor": "left",
-                "xshift": 6,
-                "yshift": 13,
-                "font": {"size": 12, "color": palette.best if flight is best else palette.ink},
+            theme.label(
+                formatting.short(flight.error),
+                palette.best if flight is best else palette.ink,
+                x=flight.number,
+                y=flight.error,
+                xshift=6,
+                yshift=13,
                 **({"bgcolor": palette.surface, "borderpad": 1} if self._is_crowded else {}),
-            }
+            )
             for flight in flights
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
@@ -301,46 +292,42 @@ class ErrorsFigure:
             line={**theme.line(palette.best, 2), "shape": "hv"},
         )
 
-    def _threshold(self, palette: Palette, last: int) -> list[Trace]:
+    def _threshold(self, palette: Palette, last: int) -> Iterator[Trace]:
         """The error below which the stop rule counts a further flight as an improvement."""
         best, improvement = self.history.best, self.history.stop_improvement
         if best is None or best.error is None or improvement is None:
-            return []
+            return
         value = round(best.error * (1 - improvement), 6)
-        return [
-            scatter(
-                f"To beat: {formatting.short(value)}",
-                ([0.5, last + 0.95], [value, value]),
-                role="threshold",
-                line=theme.line(palette.dim, 1.25, "dot"),
-            )
-        ]
+        yield scatter(
+            f"To beat: {formatting.short(value)}",
+            ([0.5, last + 0.95], [value, value]),
+            role="threshold",
+            line=theme.line(palette.dim, 1.25, "dot"),
+        )
 
-    def _predicted(self, palette: Palette, top: float) -> list[Trace]:
+    def _predicted(self, palette: Palette, top: float) -> Iterator[Trace]:
         """The predicted error of each flight, or only the next one's if there are many: a diamond, or where it is off
         the scale, a triangle at the edge."""
         known = self._predictions()
         if not known and self.history.proposal is None:
-            return []
-        return [
-            scatter(
-                "Predicted",
-                ([number for number, _ in known], [min(value, round(top, 6)) for _, value in known]),
-                role="predicted",
-                about=self._next,
-                visible=bool(known),
-                mode="markers",
-                text=[f"{value:.4f}" for _, value in known],
-                marker={
-                    "size": 13,
-                    "symbol": ["triangle-up-open" if value > top else "diamond-open" for _, value in known],
-                    "color": palette.prediction,
-                    "line": {"width": 1.75},
-                },
-                cliponaxis=False,
-                hovertemplate=f"<b>Flight %{{x}}, predicted</b><br>%{{text}} {self.history.error_unit}<extra></extra>",
-            )
-        ]
+            return
+        yield scatter(
+            "Predicted",
+            ([number for number, _ in known], [min(value, round(top, 6)) for _, value in known]),
+            role="predicted",
+            about=self._next,
+            visible=bool(known),
+            mode="markers",
+            text=[f"{value:.4f}" for _, value in known],
+            marker={
+                "size": 13,
+                "symbol": ["triangle-up-open" if value > top else "diamond-open" for _, value in known],
+                "color": palette.prediction,
+                "line": {"width": 1.75},
+            },
+            cliponaxis=False,
+            hovertemplate=f"<b>Flight %{{x}}, predicted</b><br>%{{text}} {self.history.error_unit}<extra></extra>",
+        )
 
     def _predictions(self) -> list[tuple[int, float]]:
         """Predicted errors by the number of their flight."""

@@ -2,7 +2,7 @@
 its deviation, climb rate, throttle and battery, with the flight's events.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from app.core.records.flight_events import FlightEvent
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, literal, ready, scatter, table_of_curves
-from app.figures.data import Band, Curve, Range, target_of
+from app.figures.base import Card, Table, Trace, literal, ready, scatter, table_of_curves
+from app.figures.data import Band, Curve, Range, Scored
 from app.figures.deviations import deviation_axis, deviation_of, is_step, scored_deviation_limit, scored_part
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
@@ -46,17 +46,13 @@ class ChannelPanel:
     limits: Range | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlightRecordData:
+@dataclass(frozen=True, kw_only=True)
+class FlightRecordData(Scored):
     """One recorded flight, with what else was recorded in `panels`, from top to bottom. `is_over`: it has flown, so a
     record that is missing will not follow by itself."""
 
     number: int
-    output_title: str
-    output_unit: str
     curve: Curve | None
-    set_point: Curve
-    reference: Curve | None = None
     predicted: Curve | None = None
     predicted_name: str = "Predicted"
     band: Band | None = None
@@ -67,12 +63,6 @@ class FlightRecordData:
     events: tuple[FlightEvent, ...] = ()
     notes: tuple[FlightEvent, ...] = ()
     is_over: bool = False
-    by_reference: bool = False
-
-    @property
-    def target(self) -> Curve:
-        """What the output is scored against."""
-        return target_of(self.set_point, self.reference, by_reference=self.by_reference)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,13 +106,13 @@ class FlightFigure:
             *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
         ]
 
-    def _deviation(self, palette: Palette, curve: Curve) -> list[Trace]:
+    def _deviation(self, palette: Palette, curve: Curve) -> Iterator[Trace]:
         record = self.record
         if not self._has_deviation:
-            return []
+            return
         deviation = scored_part(deviation_of(curve, record.target), record.set_point)
         drawn = _line("Deviation", deviation, palette.ink, 1.75, "deviation", record.output_unit)
-        return [{**drawn, "yaxis": "y2", "showlegend": False}]
+        yield {**drawn, "yaxis": "y2", "showlegend": False}
 
     def _channels(self, palette: Palette) -> list[Trace]:
         colours = (palette.ink, *palette.gains)
@@ -146,16 +136,16 @@ class FlightFigure:
         )
         places = _places(len(record.panels) + self._has_deviation)
         output = f"{record.output_title} ({record.output_unit})"
-        axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=places[0], range=[low, high])}
+        axes: dict[str, object] = {"yaxis": theme.axis(palette, output, domain=places[0], range=[low, high])}
         if self._has_deviation:
             axes["yaxis2"] = deviation_axis(
                 palette, scored_deviation_limit(curve, record.target, goal), record.output_unit, domain=places[1]
             )
         for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
-            axes[f"yaxis{place}"] = theme.titled(palette, panel.title, domain=places[place - 1], nticks=4)
+            axes[f"yaxis{place}"] = theme.axis(palette, panel.title, domain=places[place - 1], nticks=4)
         lasts_s = float(goal.time_s[-1])
         begin = min(float(curve.time_s[0]), -_FIRST_NAME * lasts_s) - 0.01 * lasts_s
-        axes["xaxis"] = theme.titled(
+        axes["xaxis"] = theme.axis(
             palette,
             "Time since the command (s)",
             anchor=f"y{theme.suffix(len(places))}",
@@ -174,8 +164,8 @@ class FlightFigure:
             hovermode="x unified",
             hoversubplots="axis",
             shapes=[
-                *(_mark(event, palette.dim) for event in record.events),
-                *(_mark(note, palette.prediction) for note in record.notes),
+                *(theme.upright(event.time_s, palette.dim, 1, yref="paper") for event in record.events),
+                *(theme.upright(note.time_s, palette.prediction, 1, yref="paper") for note in record.notes),
             ],
             annotations=[
                 *_names(palette, record.events, lasts_s),
@@ -221,19 +211,16 @@ class FlightFigure:
 
     def _table(self, curve: Curve) -> Table:
         record = self.record
-        named = [
-            (Column("measured", "Measured", record.output_unit, 3), curve),
-            (Column("set_point", "Set point", record.output_unit, 3), record.set_point),
-        ]
+        named = [("measured", "Measured", curve), ("set_point", "Set point", record.set_point)]
         if record.predicted is not None:
-            named.append((Column("predicted", record.predicted_name, record.output_unit, 3), record.predicted))
-        named += [
-            (Column(title.lower().replace(" ", "_"), title, "", 3), channel)
+            named.append(("predicted", record.predicted_name, record.predicted))
+        channels = [
+            (title.lower().replace(" ", "_"), title, channel)
             for panel in record.panels
             for title, channel in panel.curves.items()
         ]
         seconds = np.linspace(float(curve.time_s[0]), float(curve.time_s[-1]), TABLE_ROWS)
-        return table_of_curves(seconds.tolist(), 2, named)
+        return table_of_curves(seconds.tolist(), 2, record.output_unit, named, channels)
 
 
 def _places(below: int) -> list[list[float]]:
@@ -243,45 +230,29 @@ def _places(below: int) -> list[list[float]]:
     return [[max(0.0, top - (height if index else _OUTPUT_SHARE * height)), top] for index, top in enumerate(tops)]
 
 
-def _saturated(palette: Palette, command: Curve, limits: Range) -> Sequence[Trace]:
+def _saturated(palette: Palette, command: Curve, limits: Range) -> Iterator[Trace]:
     """Where the command is at a limit between the first and the last time that it is above the lower one, while the
     motors run; no trace if it never is."""
     is_above = command.values > limits.low
     runs = np.maximum.accumulate(is_above) & np.maximum.accumulate(is_above[::-1])[::-1]
     held = runs & ((command.values >= limits.high) | (command.values <= limits.low))
     if not held.any():
-        return ()
+        return
     edges = np.flatnonzero(np.diff(np.concatenate(([False], held, [False])).astype(np.int8)))
     x: list[float | None] = []
     y: list[float | None] = []
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         x += [round(float(command.time_s[at]), 3) for at in (first, end - 1)] + [None]
         y += [float(command.values[at]) for at in (first, end - 1)] + [None]
-    return (
-        scatter(
-            "Saturated",
-            (x[:-1], y[:-1]),
-            role="saturated",
-            mode="lines+markers",
-            line=theme.line(palette.bad, 5),
-            marker=theme.solid(palette.bad, size=5),
-            showlegend=True,
-        ),
+    yield scatter(
+        "Saturated",
+        (x[:-1], y[:-1]),
+        role="saturated",
+        mode="lines+markers",
+        line=theme.line(palette.bad, 5),
+        marker=theme.solid(palette.bad, size=5),
+        showlegend=True,
     )
-
-
-def _mark(event: FlightEvent, colour: str) -> dict[str, object]:
-    """A vertical line through all panels."""
-    return {
-        "type": "line",
-        "x0": event.time_s,
-        "x1": event.time_s,
-        "y0": 0,
-        "y1": 1,
-        "yref": "paper",
-        "layer": "below",
-        "line": {"color": colour, "width": 1, "dash": "dot"},
-    }
 
 
 def _names(palette: Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
@@ -311,16 +282,7 @@ def _note(palette: Palette, note: FlightEvent, bottom: float) -> dict[str, objec
 
 
 def _along(time_s: float, text: str, colour: str, **place: object) -> dict[str, object]:
-    return {
-        "text": text,
-        "x": time_s,
-        "yref": "paper",
-        "xanchor": "left",
-        "textangle": -90,
-        "showarrow": False,
-        "font": {"size": 12, "color": colour},
-        **place,
-    }
+    return theme.label(text, colour, **{"x": time_s, "yref": "paper", "textangle": -90, **place})
 
 
 def _line(

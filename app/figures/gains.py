@@ -55,8 +55,7 @@ class GainsFigure:
     def _panel(self, palette: Palette, index: int, gain: Gain) -> list[Trace]:
         colour = palette.gains[(index - 1) % len(palette.gains)]
         flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
-        suffix = theme.suffix(index)
-        axes: dict[str, Any] = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "cliponaxis": False}
+        axes: dict[str, Any] = {**theme.on(index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
         crowded = len(flights) > MANY
         flown = scatter(

@@ -1,7 +1,8 @@
 """A campaign's gains as a path over the model's error: contours over two gains at a time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -78,14 +79,27 @@ class LandscapeFigure:
         )
         return ready(self, traces, layout, summary=self._summary(scale), table=self._table())
 
-    def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> list[Trace]:
-        return [
-            *contour_traces(palette, index, one, scale, self.history.error_unit, self._taken(one)),
-            *self._line(palette, index, one),
-            *self._tried(palette, index, one),
-            *self._path(palette, index, one),
-            *self._proposed(palette, index, one),
-        ]
+    def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> Iterator[Trace]:
+        """All traces of a slice: the contours, then what lies over them."""
+        yield from contour_traces(palette, index, one, scale, self.history.error_unit, self._taken(one))
+        draw = partial(_marks, index, one)
+        ends = to_edge(one, self.landscape.centre, self.search.direction)
+        if ends is not None:
+            name = "Along gradient" if self.search.tried else "To the optimum"
+            yield draw(ends, "line", name, "lines", line=theme.line(palette.prediction, 2, "dot"))
+        inside = [step for step in self.search.tried if holds(one, step.gains)]
+        if inside:
+            unit = self.history.error_unit
+            yield draw(
+                [step.gains for step in inside],
+                "tried",
+                "Tried on model",
+                "markers",
+                marker=theme.solid(palette.prediction, size=6, symbol="circle-open", line={"width": 1.5}),
+                hovertext=[f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
+            )
+        yield from self._path(palette, one, draw)
+        yield from self._proposed(palette, draw)
 
     def _taken(self, one: Slice) -> list[Box]:
         """The room of all marks and numbers in a slice."""
@@ -109,15 +123,13 @@ class LandscapeFigure:
         kept = [flight for flight in earlier if flight is earlier[0] or flight is self.history.best]
         return [*kept, *self.history.flights[-LONGEST_PATH:]]
 
-    def _path(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
+    def _path(self, palette: Palette, one: Slice, draw: Callable[..., Trace]) -> Iterator[Trace]:
         flights, best = self._shown(), self.history.best
         if not flights:
-            return []
+            return
         unit, texts = self.history.error_unit, self._texts(one)
-        stars, edge = [flight is best for flight in flights], {"width": 1.5, "color": palette.surface}
-        path = _marks(
-            index,
-            one,
+        stars = [flight is best for flight in flights]
+        yield draw(
             [flight.gains for flight in flights],
             "path",
             "Flights in order" if len(flights) == len(self.history.flights) else f"Last {LONGEST_PATH} flights",
@@ -136,74 +148,33 @@ class LandscapeFigure:
             textfont={"size": 12, "color": palette.ink, "weight": 700, "shadow": "auto"},
             hovertext=[_hover_text(flight, unit) for flight in flights],
         )
-        if best is None:
-            return [path]
-        star = _marks(
-            index,
-            one,
-            [best.gains],
-            "best",
-            f"Best, flight {best.number}",
-            "markers",
-            marker=theme.solid(palette.best, size=_STAR_PX, symbol="star", line=edge),
-            hovertext=[_hover_text(best, unit)],
-        )
-        return [path, star]
+        if best is not None:
+            edge = {"width": 1.5, "color": palette.surface}
+            yield draw(
+                [best.gains],
+                "best",
+                f"Best, flight {best.number}",
+                "markers",
+                marker=theme.solid(palette.best, size=_STAR_PX, symbol="star", line=edge),
+                hovertext=[_hover_text(best, unit)],
+            )
 
-    def _line(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
-        """From the centre along the search direction to the edge of the slice."""
-        ends = to_edge(one, self.landscape.centre, self.search.direction)
-        if ends is None:
-            return []
-        is_gradient = bool(self.search.tried)
-        line = _marks(
-            index,
-            one,
-            ends,
-            "line",
-            "Along gradient" if is_gradient else "To the optimum",
-            "lines",
-            line=theme.line(palette.prediction, 2, "dot"),
-        )
-        return [line]
-
-    def _tried(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
-        inside = [step for step in self.search.tried if holds(one, step.gains)]
-        if not inside:
-            return []
-        unit = self.history.error_unit
-        steps = _marks(
-            index,
-            one,
-            [step.gains for step in inside],
-            "tried",
-            "Tried on model",
-            "markers",
-            marker=theme.solid(palette.prediction, size=6, symbol="circle-open", line={"width": 1.5}),
-            hovertext=[f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
-        )
-        return [steps]
-
-    def _proposed(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
+    def _proposed(self, palette: Palette, draw: Callable[..., Trace]) -> Iterator[Trace]:
         proposal = self.history.proposal
         if proposal is None:
-            return []
+            return
         prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
-        mark = _marks(
-            index,
-            one,
+        edge = {"width": 1.5, "color": palette.surface}
+        yield draw(
             [proposal.gains],
             "proposed",
             f"Next, flight {proposal.number}",
             "markers",
-            marker=theme.solid(
-                palette.prediction, size=13, symbol="diamond", line={"width": 1.5, "color": palette.surface}
-            ),
+            marker=theme.solid(palette.prediction, size=13, symbol="diamond", line=edge),
             hovertext=[
                 f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
             ],
         )
-        return [mark]
 
     def _axes(self, palette: Palette, index: int, one: Slice) -> dict[str, object]:
         across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
@@ -211,7 +182,7 @@ class LandscapeFigure:
         suffix = theme.suffix(index)
         axes = (("x", "y", one.x, one.x_values, across, 5), ("y", "x", one.y, one.y_values, up, 6))
         return {
-            f"{own}axis{suffix}": theme.titled(
+            f"{own}axis{suffix}": theme.axis(
                 palette,
                 _title(named[gain]),
                 domain=place,
@@ -280,7 +251,6 @@ def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
 
 def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str, mode: str, **more: Any) -> Trace:
     """A trace through these gains, projected onto the slice; a `hovertext` is shown with the two gains."""
-    suffix = theme.suffix(index)
     if "hovertext" in more:
         more["hovertemplate"] = f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>"
     return scatter(
@@ -289,8 +259,7 @@ def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str,
         role=role,
         about={"slice": index},
         mode=mode,
-        xaxis=f"x{suffix}",
-        yaxis=f"y{suffix}",
+        **theme.on(index),
         legendgroup=role,
         cliponaxis=True,
         **more,

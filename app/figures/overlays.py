@@ -21,10 +21,10 @@ Side = Literal["left", "center", "right"]
 """Where a label is, seen from its mark."""
 
 
-def band_traces(palette: Palette, band: Band | None) -> list[Trace]:
+def band_traces(palette: Palette, band: Band | None) -> Iterator[Trace]:
     """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
     if band is None:
-        return []
+        return
     quiet: dict[str, Any] = {
         "line": theme.line(theme.with_opacity(palette.prediction, 0.35), 0.75),
         "legendgroup": "band",
@@ -32,38 +32,34 @@ def band_traces(palette: Palette, band: Band | None) -> list[Trace]:
     }
     lower, upper = (thin_by_bends(curve.time_s, curve.values) for curve in (band.lower, band.upper))
     fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.prediction, 0.14)}
-    return [
-        scatter("Likely, lower edge", lower, role="band", about={"edge": "lower"}, showlegend=False, **quiet),
-        scatter("Likely", upper, role="band", about={"edge": "upper"}, **fill, **quiet),
-    ]
+    yield scatter("Likely, lower edge", lower, role="band", about={"edge": "lower"}, showlegend=False, **quiet)
+    yield scatter("Likely", upper, role="band", about={"edge": "upper"}, **fill, **quiet)
 
 
 def glitch_traces(
     palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
-) -> list[Trace]:
+) -> Iterator[Trace]:
     """The glitches of a flight's record, over its curve: one trace, or none."""
     if curve is None or not glitches:
-        return []
+        return
     x: list[float | None] = []
     y: list[float | None] = []
     for glitch in glitches:
         first, end = glitch.slice_of(curve.time_s)  # with the samples just before and after it, so that a gap shows
         time_s, values = thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)
         x, y = [*x, *time_s, None], [*y, *values, None]
-    return [
-        scatter(
-            f"Flight {number}, glitch",
-            (x[:-1], y[:-1]),
-            role="glitch",
-            about={"trial": number},
-            mode="lines+markers",
-            line=theme.line(palette.bad, 5),
-            marker={"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
-            opacity=0.85,
-            showlegend=False,
-            hovertemplate=reading(f"Flight {number}, glitch", unit),
-        )
-    ]
+    yield scatter(
+        f"Flight {number}, glitch",
+        (x[:-1], y[:-1]),
+        role="glitch",
+        about={"trial": number},
+        mode="lines+markers",
+        line=theme.line(palette.bad, 5),
+        marker={"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
+        opacity=0.85,
+        showlegend=False,
+        hovertemplate=reading(f"Flight {number}, glitch", unit),
+    )
 
 
 PRINT: Final = 0.18
@@ -237,28 +233,26 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
     return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
 
 
-def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> list[Trace]:
+def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> Iterator[Trace]:
     """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
     if envelope is None:
-        return []
+        return
     edge: dict[str, Any] = {"line": theme.line(palette.earlier, 0.75), "legendgroup": "envelope", "legendrank": 800}
     fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.earlier, 0.3)}
     name = f"80\u00a0% of {envelope.flights} flights"
     lower, upper, median = map(_points, (envelope.band.lower, envelope.band.upper, envelope.median))
-    return [
-        scatter("Lower edge", lower, role="envelope", about={"edge": "lower"}, showlegend=False, **edge),
-        scatter(name, upper, role="envelope", about={"edge": "upper"}, **fill, **edge),
-        scatter(
-            "Median",
-            median,
-            role="envelope",
-            about={"edge": "middle"},
-            line=theme.line(palette.earlier, 1.5, "longdash"),
-            legendgroup="median",
-            legendrank=800,
-            hovertemplate=reading(f"Median of {envelope.flights} flights", unit),
-        ),
-    ]
+    yield scatter("Lower edge", lower, role="envelope", about={"edge": "lower"}, showlegend=False, **edge)
+    yield scatter(name, upper, role="envelope", about={"edge": "upper"}, **fill, **edge)
+    yield scatter(
+        "Median",
+        median,
+        role="envelope",
+        about={"edge": "middle"},
+        line=theme.line(palette.earlier, 1.5, "longdash"),
+        legendgroup="median",
+        legendrank=800,
+        hovertemplate=reading(f"Median of {envelope.flights} flights", unit),
+    )
 
 
 def _instants(until_s: float) -> Samples:

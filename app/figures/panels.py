@@ -97,19 +97,17 @@ class PanelsFigure:
             if line.marks
             else {"mode": "lines", "line": theme.line(colour, width, dash)}
         )
-        note, suffix = f"<br>{line.note}" if line.note else "", theme.suffix(number)
+        note = f"<br>{line.note}" if line.note else ""
         trace = scatter(
             line.name,
             (list(line.x), list(line.y)),
             role=line.style,
             about={"panel": number, "line": line.name},
-            xaxis=f"x{suffix}",
-            yaxis=f"y{suffix}",
             legendgroup=line.name,
             showlegend=in_legend,
             hovertemplate=f"<b>{line.name}</b><br>%{{x}} · %{{y:.{panel.digits}f}}{note}<extra></extra>",
         )
-        return trace | drawn
+        return trace | theme.on(number) | drawn
 
     def _axes(self, palette: Palette, number: int, panel: Panel) -> dict[str, object]:
         count, suffix = len(self.plot.panels), theme.suffix(number)
@@ -118,7 +116,7 @@ class PanelsFigure:
         place = theme.stacked(number, count, GAP)
         return {
             f"xaxis{suffix}": theme.shared_axis(palette, self.plot.x_title, number, count, **x),
-            f"yaxis{suffix}": theme.titled(
+            f"yaxis{suffix}": theme.axis(
                 palette, panel.y_title, anchor=f"x{suffix}", domain=place, nticks=7 if count == 1 else 4, **y
             ),
         }
@@ -180,36 +178,10 @@ def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
     return pens[style]
 
 
-@dataclass(frozen=True, slots=True)
-class ControllerFigure:
-    """One panel per signal over a common time axis.
-
-    Traces as in `PanelsFigure`, with the roles `recorded`, `replica` and `differs`.
-    """
-
-    signals: Sequence[Overlaid]
-    heading: str
-    summary: str
-    theme: ThemeName = "light"
-    name: ClassVar[str] = "controller"
-
-    @property
-    def title(self) -> str:
-        return self.heading
-
-    def not_ready(self) -> str | None:
-        return None if self.signals else "The log contains no command that could be simulated again."
-
-    def compute(self) -> Card:
-        plot = Plot(
-            title=self.heading,
-            summary=self.summary,
-            x_title="Time in the recording (s)",
-            panels=tuple(
-                Panel(y_title=signal.label, digits=signal.digits, lines=_lines(signal)) for signal in self.signals
-            ),
-        )
-        return PanelsFigure(plot, self.theme).compute()
+def replica_plot(signals: Sequence[Overlaid], title: str, summary: str) -> Plot:
+    """Recorded signals beside those of the replica, one panel each, with the roles `recorded`, `replica`, `differs`."""
+    panels = (Panel(y_title=signal.label, digits=signal.digits, lines=_lines(signal)) for signal in signals)
+    return Plot(title=title, summary=summary, x_title="Time in the recording (s)", panels=tuple(panels))
 
 
 def _lines(signal: Overlaid) -> tuple[Line, ...]:

@@ -2,13 +2,14 @@
 best emphasised, the next one's prediction dashed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar, Final, cast
 
 from app.core.formatting import count, short
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History, Range
 from app.figures.deviations import (
     changes_of,
@@ -30,6 +31,7 @@ from app.figures.overlays import (
     select_individual_flights,
 )
 from app.figures.scale import robust_span, thin_by_bends, thinned
+from app.figures.standings import SHARED_LEGEND, drawing_order, standing_of, style_of
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 CURVE_POINTS: Final = 500
@@ -43,8 +45,6 @@ DEVIATION_SHARE: Final = 0.3
 """Height of the lower panel, as a share of the figure."""
 _PANEL_GAP: Final = 0.07
 _DEVIATION_POINTS: Final = 160
-SHARED_LEGEND: Final = {"earlier": "Earlier", "invalid": "Not counted"}
-"""Standings whose flights look alike and share a legend entry."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
 
@@ -84,6 +84,7 @@ class TrajectoriesFigure:
         emphasised = select_individual_flights(history, history.chosen)
         recorded = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
         drawn = [flight for flight in recorded if flight.number in emphasised]
+        in_order = sorted(drawn, key=partial(drawing_order, history))
         envelope = envelope_of(recorded, self._lasts_s) if len(drawn) < len(recorded) else None
         points = max(60, min(CURVE_POINTS, ALL_POINTS // max(1, len(drawn))))
         band = None if history.proposal is None else history.proposal.band
@@ -94,20 +95,18 @@ class TrajectoriesFigure:
             *self._altitude_limit(palette),
         ]
         low, high, outside = self._span(drawn)
-        traces += self._deviations(palette, drawn)
-        traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
+        traces += self._deviations(palette, in_order)
+        traces += [self._flight(palette, flight, points) for flight in in_order]
         for flight in drawn:
             traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
         traces += [*self._legend(palette, drawn), *self._prediction(palette)]
         traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
+        leaving_top = self._off_scale(palette, [drawn[index] for index in outside if index < len(drawn)], low, high)
+        leaving = []
         if is_step(history.set_point):
             # Plotly places an axis only if it has a trace with a point, even a missing one.
             one_missing = ([None], [None])
             traces.append(self._empty(palette, "live deviation", "Flying now, deviation", one_missing, yaxis="y2"))
-        leaving_top = self._off_scale(palette, [drawn[index] for index in outside if index < len(drawn)], low, high)
-        traces += leaving_top
-        leaving = []
-        if is_step(history.set_point):
             leaving = off_scale_deviations(
                 palette,
                 drawn,
@@ -116,7 +115,7 @@ class TrajectoriesFigure:
                 unit=history.output_unit,
                 window=self._visible,
             )
-        traces += leaving
+        traces += [*leaving_top, *leaving]
         opening = "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s"
         layout = theme.layout(
             palette,
@@ -153,12 +152,10 @@ class TrajectoriesFigure:
         both = is_step(history.set_point)
         place = [DEVIATION_SHARE + _PANEL_GAP, 1.0] if both else [0.0, 1.0]
         axes: dict[str, object] = {
-            "xaxis": theme.titled(
+            "xaxis": theme.axis(
                 palette, "Time since the command (s)", range=self._opening_s, anchor="y2" if both else "y"
             ),
-            "yaxis": theme.titled(
-                palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7
-            ),
+            "yaxis": theme.axis(palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7),
         }
         if both:
             axes["yaxis2"] = deviation_axis(palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])
@@ -178,47 +175,48 @@ class TrajectoriesFigure:
             if part is not None
         ]
 
-    def _deviations(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
+    def _deviations(self, palette: Palette, drawn: list[FlightData]) -> Iterator[Trace]:
         """Output − target of each flight and of the prediction, in the lower panel."""
         if not is_step(self.history.set_point):
-            return []
-        unit, proposal = self.history.output_unit, self.history.proposal
+            return
+        proposal = self.history.proposal
         points = max(60, min(_DEVIATION_POINTS, ALL_POINTS // 3 // max(1, len(drawn))))
-        own = [
-            self._trace(
-                f"Flight {flight.number}, deviation",
-                deviation_of(flight.curve, self.history.target),
+
+        def deviation(name: str, title: str, curve: Curve, look: str, **more: Any) -> Trace:
+            return self._trace(
+                name,
+                deviation_of(curve, self.history.target),
                 points,
-                role="deviation",
-                about={"trial": flight.number, "standing": standing},
-                uid=f"deviation-{flight.number}",
-                line=_style(palette, standing),
-                legendgroup=standing,
+                line=style_of(palette, look),
                 showlegend=False,
                 yaxis="y2",
-                hovertemplate=reading(f"Flight {flight.number}, deviation", unit, form="+.3f"),
+                hovertemplate=reading(title, self.history.output_unit, form="+.3f"),
+                **more,
             )
-            for flight in sorted(drawn, key=self._weight)
-            if flight.curve is not None
-            for standing in [self._standing(flight)]
-        ]
-        if proposal is None or proposal.curve is None:
-            return own
-        predicted = self._trace(
-            f"{proposal.curve_name}: deviation",
-            deviation_of(proposal.curve, self.history.target),
-            points,
-            role="predicted deviation",
-            about={"trial": proposal.number},
-            uid="predicted-deviation",
-            line=_style(palette, "prediction"),
-            showlegend=False,
-            yaxis="y2",
-            hovertemplate=reading(
-                f"Flight {proposal.number}, {proposal.curve_name.lower()}: deviation", unit, form="+.3f"
-            ),
-        )
-        return [*own, predicted]
+
+        for flight in drawn:
+            if flight.curve is not None:
+                name, standing = f"Flight {flight.number}, deviation", standing_of(self.history, flight)
+                yield deviation(
+                    name,
+                    name,
+                    flight.curve,
+                    standing,
+                    role="deviation",
+                    about={"trial": flight.number, "standing": standing},
+                    uid=f"deviation-{flight.number}",
+                    legendgroup=standing,
+                )
+        if proposal is not None and proposal.curve is not None:
+            yield deviation(
+                f"{proposal.curve_name}: deviation",
+                f"Flight {proposal.number}, {proposal.curve_name.lower()}: deviation",
+                proposal.curve,
+                "prediction",
+                role="predicted deviation",
+                about={"trial": proposal.number},
+                uid="predicted-deviation",
+            )
 
     @property
     def _deviation_limit(self) -> float:
@@ -239,26 +237,9 @@ class TrajectoriesFigure:
             low, high = min(low, float(curves[0].min())), max(high, float(curves[0].max()))
         return robust_span(curves, low=low, high=high)
 
-    def _standing(self, flight: FlightData) -> str:
-        if flight.outcome == "not yet reviewed":
-            return "unjudged"
-        if flight.outcome != "valid":
-            return "invalid"
-        if flight is self.history.best:
-            return "best"
-        if flight is self.history.latest and flight.gains == self.history.flights[0].gains:
-            return "latest" if len(self.history.flights) == 1 else "baseline"
-        return "latest" if flight is self.history.latest else "earlier"
-
-    def _weight(self, flight: FlightData) -> tuple[int, int]:
-        """Drawing order: the most important flights last, on top."""
-        return ("invalid", "earlier", "baseline", "latest", "unjudged", "best").index(
-            self._standing(flight)
-        ), flight.number
-
     def _flight(self, palette: Palette, flight: FlightData, points: int) -> Trace:
         assert flight.curve is not None
-        standing = self._standing(flight)
+        standing = standing_of(self.history, flight)
         label = {
             "best": f"{flight.number} · {'best' if self.history.is_best_of_best_gains else 'lowest error'}",
             "latest": f"{flight.number} · latest",
@@ -275,7 +256,7 @@ class TrajectoriesFigure:
             role="flight",
             about={"trial": flight.number, "standing": standing},
             uid=f"flight-{flight.number}",
-            line=_style(palette, standing),
+            line=style_of(palette, standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
             showlegend=standing not in SHARED_LEGEND,
@@ -284,14 +265,14 @@ class TrajectoriesFigure:
 
     def _legend(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
         """One entry for all flights that look alike, so that the legend does not grow with every flight."""
-        standings = {self._standing(flight) for flight in drawn}
+        standings = {standing_of(self.history, flight) for flight in drawn}
         return [
             scatter(
                 name,
                 ([None], [None]),
                 role="legend",
                 about={"standing": standing},
-                line=_style(palette, standing),
+                line=style_of(palette, standing),
                 legendgroup=standing,
                 legendrank=800,
             )
@@ -314,40 +295,34 @@ class TrajectoriesFigure:
             if curve is not None
         ]
 
-    def _altitude_limit(self, palette: Palette) -> list[Trace]:
+    def _altitude_limit(self, palette: Palette) -> Iterator[Trace]:
         limit_m = self.history.altitude_limit_m
         if limit_m is None:
-            return []
-        return [
-            scatter(
-                "Altitude limit: abort",
-                (self._whole_s, [limit_m, limit_m]),
-                role="limit",
-                line=theme.line(palette.bad, 2, "longdashdot"),
-                legendrank=901,
-                visible=False,
-            )
-        ]
+            return
+        yield scatter(
+            "Altitude limit: abort",
+            (self._whole_s, [limit_m, limit_m]),
+            role="limit",
+            line=theme.line(palette.bad, 2, "longdashdot"),
+            legendrank=901,
+            visible=False,
+        )
 
-    def _prediction(self, palette: Palette) -> list[Trace]:
+    def _prediction(self, palette: Palette) -> Iterator[Trace]:
         proposal = self.history.proposal
         if proposal is None or proposal.curve is None:
-            return []
-        return [
-            self._trace(
-                proposal.curve_name,
-                proposal.curve,
-                CURVE_POINTS,
-                role="prediction",
-                about={"trial": proposal.number},
-                uid="prediction",
-                line=_style(palette, "prediction"),
-                legendrank=899,
-                hovertemplate=reading(
-                    f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit
-                ),
-            )
-        ]
+            return
+        yield self._trace(
+            proposal.curve_name,
+            proposal.curve,
+            CURVE_POINTS,
+            role="prediction",
+            about={"trial": proposal.number},
+            uid="prediction",
+            line=style_of(palette, "prediction"),
+            legendrank=899,
+            hovertemplate=reading(f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit),
+        )
 
     def _empty(
         self, palette: Palette, role: str, name: str, points: tuple[list[None], list[None]] = ([], []), **style: Any
@@ -387,32 +362,29 @@ class TrajectoriesFigure:
         return f"{history.output_title} over time: {count(len(history.flights), 'flight')}.{found}{off}"
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
-        history, unit = self.history, self.history.output_unit
-        named: list[tuple[Column, Curve]] = [(Column("set_point", "Set point", unit, 3), history.set_point)]
+        history, proposal = self.history, self.history.proposal
+        named = [("set_point", "Set point", history.set_point)]
         if history.reference is not None:
-            named.append((Column("reference", "Reference", unit, 3), history.reference))
+            named.append(("reference", "Reference", history.reference))
         if envelope is not None:
             curves = (envelope.band.lower, envelope.median, envelope.band.upper)
             named += [
-                (
-                    Column(f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", unit, 3),
-                    curve,
-                )
+                (f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", curve)
                 for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
             ]
         named += [
-            (Column(f"flight_{flight.number}", f"Flight {flight.number}", unit, 3), flight.curve)
+            (f"flight_{flight.number}", f"Flight {flight.number}", flight.curve)
             for flight in drawn
             if flight.curve is not None
         ]
-        if history.proposal is not None and history.proposal.curve is not None:
-            title = f"Flight {history.proposal.number}, {history.proposal.curve_name.lower()}"
-            named.append((Column("prediction", title, unit, 3), history.proposal.curve))
-            if history.proposal.band is not None:
-                named.append((Column("prediction_lower", f"{title}, at least", unit, 3), history.proposal.band.lower))
-                named.append((Column("prediction_upper", f"{title}, at most", unit, 3), history.proposal.band.upper))
-        lasts = float(history.set_point.time_s[-1])
-        return table_of_curves([time_s for time_s in TABLE_TIMES_S if time_s <= lasts], 1, named)
+        if proposal is not None and proposal.curve is not None:
+            title = f"Flight {proposal.number}, {proposal.curve_name.lower()}"
+            named.append(("prediction", title, proposal.curve))
+            if proposal.band is not None:
+                named.append(("prediction_lower", f"{title}, at least", proposal.band.lower))
+                named.append(("prediction_upper", f"{title}, at most", proposal.band.upper))
+        times_s = [time_s for time_s in TABLE_TIMES_S if time_s <= self._lasts_s]
+        return table_of_curves(times_s, 1, history.output_unit, named)
 
 
 def _with_uids(traces: list[Trace]) -> list[Trace]:
@@ -423,15 +395,3 @@ def _with_uids(traces: list[Trace]) -> list[Trace]:
     about = (cast("Mapping[str, object]", trace["meta"]).values() for trace in traces)
     uids = ("-".join(map(str, each)).replace(" ", "-") for each in about)
     return [{"uid": uid, **trace} for uid, trace in zip(uids, traces, strict=True)]
-
-
-def _style(palette: Palette, standing: str) -> dict[str, object]:
-    return {
-        "best": theme.line(palette.best, 3),
-        "latest": theme.line(palette.ink, 2),
-        "baseline": theme.line(palette.earlier, 1.75, "longdash"),
-        "prediction": theme.line(palette.prediction, 2.25, "dash"),
-        "earlier": theme.line(palette.earlier, 1.25),
-        "invalid": theme.line(palette.bad, 1.25, "dot"),
-        "unjudged": theme.line(palette.ink, 2, "longdash"),
-    }[standing]

@@ -62,8 +62,9 @@ PALETTES: Final[Mapping[ThemeName, Palette]] = MappingProxyType(
 )
 
 
-def axis(palette: Palette, **more: object) -> dict[str, object]:
-    """A plain axis: hairline grid, no frame, no zero line."""
+def axis(palette: Palette, title: str = "", **more: object) -> dict[str, object]:
+    """A plain axis with a title, if there is one: hairline grid, no frame, no zero line."""
+    text = {"text": title} if title else {}
     return {
         "gridcolor": palette.grid,
         "linecolor": palette.grid,
@@ -71,15 +72,10 @@ def axis(palette: Palette, **more: object) -> dict[str, object]:
         "ticks": "",
         "automargin": True,
         "ticklabeloverflow": "allow",
-        "title": {"font": {"size": 13, "color": palette.dim}, "standoff": 8},
+        "title": {**text, "font": {"size": 13, "color": palette.dim}, "standoff": 8},
         "tickfont": {"size": 12, "color": palette.dim},
         **more,
     }
-
-
-def titled(palette: Palette, text: str, **more: object) -> dict[str, object]:
-    """An axis with a title."""
-    return axis(palette, **{**more, "title": {"text": text, "font": {"size": 13, "color": palette.dim}, "standoff": 8}})
 
 
 def layout(palette: Palette, **more: object) -> dict[str, object]:
@@ -140,6 +136,11 @@ def suffix(index: int) -> str:
     return "" if index == 1 else str(index)
 
 
+def on(index: int) -> dict[str, object]:
+    """The axes of a trace in the panel at an index from 1."""
+    return {"xaxis": f"x{suffix(index)}", "yaxis": f"y{suffix(index)}"}
+
+
 def stacked(index: int, count: int, gap: float) -> list[float]:
     """Bottom and top of one of `count` panels as shares of the whole; the first one, 1, is on top."""
     height = (1 - gap * (count - 1)) / count
@@ -152,7 +153,7 @@ def shared_axis(palette: Palette, title: str, index: int, count: int, **more: ob
     own = {"showticklabels": index == count, "anchor": f"y{suffix(index)}", **more}
     if index > 1:
         own["matches"] = "x"
-    return titled(palette, title, **own) if index == count else axis(palette, **own)
+    return axis(palette, title if index == count else "", **own)
 
 
 def flight_ticks(last: int) -> dict[str, object]:
@@ -166,16 +167,18 @@ def flight_ticks(last: int) -> dict[str, object]:
     }
 
 
+def label(text: str, colour: str, **place: object) -> dict[str, object]:
+    """A text that begins at a place."""
+    return {"text": text, "xanchor": "left", "showarrow": False, "font": {"size": 12, "color": colour}, **place}
+
+
 def note(palette: Palette, text: str, **more: object) -> dict[str, object]:
     """A text at the left edge."""
-    return {
-        "text": text,
-        "x": 0,
-        "xref": "paper",
-        "yref": "paper",
-        "xanchor": "left",
-        "yanchor": "bottom",
-        "showarrow": False,
-        "font": {"size": 12, "color": palette.dim},
-        **more,
-    }
+    edge: dict[str, object] = {"x": 0, "xref": "paper", "yref": "paper", "yanchor": "bottom"}
+    return label(text, palette.dim, **edge | more)
+
+
+def upright(at: float, colour: str, width: float, **axes: object) -> dict[str, object]:
+    """A dotted vertical line behind the curves, from the bottom to the top of these axes."""
+    line = {"color": colour, "width": width, "dash": "dot"}
+    return {"type": "line", "x0": at, "x1": at, "y0": 0, "y1": 1, "layer": "below", "line": line, **axes}

@@ -47,7 +47,8 @@ class CalibrationFigure:
         return "The model's fitted parameters appear here once a campaign with the calibrated model has flown."
 
     def compute(self) -> Card:
-        palette, names = PALETTES[self.theme], self._names()
+        palette = PALETTES[self.theme]
+        names = [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
         axes: dict[str, object] = {}
         for index in range(1, len(names) + 1):
             axes |= self._axes(palette, index, len(names))
@@ -68,20 +69,16 @@ class CalibrationFigure:
             table=self._table(names),
         )
 
-    def _names(self) -> list[str]:
-        return [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
-
     def _panel(self, palette: Palette, index: int, name: str) -> Trace:
         shown = [point for point in self.points if name in point.fitted]
-        first, suffix = shown[0].fitted[name], theme.suffix(index)
+        first = shown[0].fitted[name]
         return scatter(
             first.title,
             ([point.flight for point in shown], [point.fitted[name].value for point in shown]),
             role="fitted",
             about={"parameter": name},
             mode="markers",
-            xaxis=f"x{suffix}",
-            yaxis=f"y{suffix}",
+            **theme.on(index),
             error_y={
                 "type": "data",
                 "array": [REACH * point.fitted[name].standard_error for point in shown],
@@ -111,19 +108,10 @@ class CalibrationFigure:
     def _tuned(self, palette: Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
+        suffixes = map(theme.suffix, range(1, panels + 1))
         return [
-            {
-                "type": "line",
-                "xref": f"x{theme.suffix(index)}",
-                "yref": f"y{theme.suffix(index)} domain",
-                "x0": self.since,
-                "x1": self.since,
-                "y0": 0,
-                "y1": 1,
-                "layer": "below",
-                "line": {"color": palette.prediction, "width": 1.5, "dash": "dot"},
-            }
-            for index in range(1, panels + 1)
+            theme.upright(self.since, palette.prediction, 1.5, xref=f"x{suffix}", yref=f"y{suffix} domain")
+            for suffix in suffixes
         ]
 
     def _table(self, names: list[str]) -> Table:
@@ -178,12 +166,12 @@ class BatteriesFigure:
         layout = theme.layout(
             palette,
             uirevision="batteries",
-            xaxis=theme.titled(
+            xaxis=theme.axis(
                 palette,
                 "Flight of this vehicle",
                 **theme.flight_ticks(len(self.flights)),
             ),
-            yaxis=theme.titled(palette, "Voltage (V)"),
+            yaxis=theme.axis(palette, "Voltage (V)"),
         )
         columns = (
             Column("flight", "Flight of the vehicle", digits=0),

@@ -10,9 +10,10 @@ from app.core.analysis.analysis import analyze
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
+from app.figures.panels import Plot
+from app.log_analyses import manoeuvres, takeoffs
 from app.log_analyses.copter_start import CopterStart, start_of
-from app.log_analyses.manoeuvres import AnalysedManoeuvres
-from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
+from app.log_analyses.schemas import LogAnswer
 from app.logs.formats import HEAD_BYTES, Format, recognise
 
 ANALYSED: Final = (
@@ -45,9 +46,12 @@ def read_start(content: bytes, companion: bytes | None, name: str) -> list[Takeo
     return start_of(analyze(found), name) if isinstance(found, LoggedFlight) else found
 
 
-def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
-    """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
+def analyze_content(content: bytes, companion: bytes | None, name: str) -> tuple[LogAnswer, Plot]:
+    """The answer of a log in memory, and its figure; takes some seconds. Raises InputError that names what is missing
+    or wrong."""
     found = _read(content, companion, name)
     if isinstance(found, LoggedFlight):
-        return AnalysedManoeuvres(analyze(found), name, found.assumed)
-    return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)
+        flight = analyze(found)
+        return manoeuvres.answer_of(flight, name, found.assumed), manoeuvres.plot_of(flight)
+    flown = analyze_takeoffs(takeoffs.logged_takeoffs(found, name=name))
+    return takeoffs.answer_of(flown, name), takeoffs.plot_of(flown)

@@ -1,7 +1,6 @@
 """The answer of an ArduCopter's or PX4's log, for a person: its facts, table, notes, parameter file and figure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
@@ -17,9 +16,7 @@ from app.log_analyses.schemas import (
     EstimatedVehicle,
     GainsInManoeuvre,
     GainsTable,
-    HoverSetting,
     LogAnswer,
-    LoggedBehaviour,
     ManoeuvreNumbers,
     ParameterFile,
 )
@@ -28,95 +25,81 @@ _LEAST_SPREAD: Final = 0.01
 _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
 
-@dataclass(frozen=True, slots=True)
-class AnalysedManoeuvres:
-    """An analysis, the log's file name, and the parameters that it lacks, for which the firmware's defaults were
-    assumed."""
+def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> LogAnswer:
+    """The answer in facts and numbers; `assumed` are the parameters that the log lacks, for which the firmware's
+    defaults were assumed."""
+    content = analysis.parameter_file(file_name)
+    name = f"{PurePath(file_name).stem}{analysis.loop.texts.parameter_suffix}"
+    return LogAnswer(
+        file_name=file_name,
+        autopilot=analysis.loop.texts.autopilot,
+        answer=analysis.answer,
+        proposes=analysis.proposed is not None,
+        starts_campaign=analysis.proposed is not None,
+        experiment=STEPS[analysis.loop.texts.autopilot].name,
+        flight=_flight(analysis),
+        vehicle=_vehicle(analysis),
+        gains=_table(analysis),
+        notes=_notes(analysis, assumed),
+        parameter_file=None if content is None else ParameterFile(name=name, content=content),
+        numbers=_numbers(analysis),
+    )
 
-    analysis: Analysis
-    file_name: str
-    assumed: Sequence[str] = ()
 
-    @property
-    def answer(self) -> LogAnswer:
-        """The answer in facts and numbers."""
-        analysis = self.analysis
-        content = analysis.parameter_file(self.file_name)
-        name = f"{PurePath(self.file_name).stem}{analysis.loop.texts.parameter_suffix}"
-        return LogAnswer(
-            file_name=self.file_name,
-            autopilot=analysis.loop.texts.autopilot,
-            answer=analysis.answer,
-            proposes=analysis.proposed is not None,
-            starts_campaign=analysis.proposed is not None,
-            experiment=STEPS[analysis.loop.texts.autopilot].name,
-            flight=_flight(analysis),
-            vehicle=self._vehicle(),
-            gains=_table(analysis),
-            notes=[*_notes(analysis), *_assumptions(self.assumed)],
-            parameter_file=None if content is None else ParameterFile(name=name, content=content),
-            numbers=self._numbers(),
+def plot_of(analysis: Analysis) -> Plot:
+    """The flight beside its prediction: altitude, deviation from the reference, throttle."""
+    shown, gains = analysis.response, (analysis.proposed or analysis.assessments[0]).gains
+    which = f"Predicted with the {'proposed' if analysis.proposed else 'same'} gains"
+    time_s = _rounded(shown.time_s)
+
+    def panel(y_title: str, digits: int, flown: Samples, predicted: Samples, *more: Line) -> Panel:
+        lines = (
+            Line(name="Flown", style="measured", x=time_s, y=_rounded(flown)),
+            Line(name=which, style="model", x=time_s, y=_rounded(predicted)),
         )
+        return Panel(y_title=y_title, digits=digits, lines=(*more, *lines))
 
-    @property
-    def plot(self) -> Plot:
-        """The flight beside its prediction: altitude, deviation from the reference, throttle."""
-        analysis = self.analysis
-        shown, gains = analysis.response, (analysis.proposed or analysis.assessments[0]).gains
-        which = f"Predicted with the {'proposed' if analysis.proposed else 'same'} gains"
-        time_s = _rounded(shown.time_s)
+    reference = Line(name="Reference", style="goal", x=time_s, y=_rounded(shown.reference_m))
+    flown_mm, predicted_mm = (1e3 * (each - shown.reference_m) for each in (shown.flown_m, shown.predicted_m))
+    return Plot(
+        title="The flight and its prediction",
+        summary=f"Altitude, deviation and throttle as flown, and as predicted with {format_gains(gains)}.",
+        x_title="Time in the flight (s)",
+        panels=(
+            panel("Altitude (m)", 2, shown.flown_m, shown.predicted_m, reference),
+            panel("Deviation (mm)", 1, flown_mm, predicted_mm),
+            panel("Throttle", 3, shown.flown_throttle, shown.predicted_throttle),
+        ),
+    )
 
-        def panel(y_title: str, digits: int, flown: Samples, predicted: Samples, *more: Line) -> Panel:
-            lines = (
-                Line(name="Flown", style="measured", x=time_s, y=_rounded(flown)),
-                Line(name=which, style="model", x=time_s, y=_rounded(predicted)),
-            )
-            return Panel(y_title=y_title, digits=digits, lines=(*more, *lines))
 
-        reference = Line(name="Reference", style="goal", x=time_s, y=_rounded(shown.reference_m))
-        flown_mm, predicted_mm = (1e3 * (each - shown.reference_m) for each in (shown.flown_m, shown.predicted_m))
-        return Plot(
-            title="The flight and its prediction",
-            summary=f"Altitude, deviation and throttle as flown, and as predicted with {format_gains(gains)}.",
-            x_title="Time in the flight (s)",
-            panels=(
-                panel("Altitude (m)", 2, shown.flown_m, shown.predicted_m, reference),
-                panel("Deviation (mm)", 1, flown_mm, predicted_mm),
-                panel("Throttle", 3, shown.flown_throttle, shown.predicted_throttle),
-            ),
-        )
+def _vehicle(analysis: Analysis) -> list[str]:
+    estimate, loop = analysis.estimate, analysis.loop
+    assumed, parameter = loop.assumed_hover_throttle, loop.texts.hover_parameter
+    mean, deviation = estimate.mean, estimate.deviation
+    return [
+        f"hover throttle {mean.hover_throttle:.3f}"
+        + (f", but {parameter} was {assumed:.3f}" if analysis.hover else ""),
+        f"thrust slope {mean.thrust_slope:.2f} ± {max(deviation.thrust_slope, _LEAST_SPREAD):.2f}",
+        f"motor lag {1e3 * mean.motor_lag_s:.0f} ± {1e3 * deviation.motor_lag_s:.0f} ms",
+        f"drag {mean.drag_1_s:.2f} ± {max(deviation.drag_1_s, _LEAST_SPREAD):.2f} 1/s",
+        f"{estimate.residual_m_s2:.2f} m/s² of acceleration unexplained",
+    ]
 
-    def _vehicle(self) -> list[str]:
-        estimate, loop = self.analysis.estimate, self.analysis.loop
-        assumed, parameter = loop.assumed_hover_throttle, loop.texts.hover_parameter
-        mean, deviation = estimate.mean, estimate.deviation
-        return [
-            f"hover throttle {mean.hover_throttle:.3f}"
-            + (f", but {parameter} was {assumed:.3f}" if self.analysis.hover else ""),
-            f"thrust slope {mean.thrust_slope:.2f} ± {max(deviation.thrust_slope, _LEAST_SPREAD):.2f}",
-            f"motor lag {1e3 * mean.motor_lag_s:.0f} ± {1e3 * deviation.motor_lag_s:.0f} ms",
-            f"drag {mean.drag_1_s:.2f} ± {max(deviation.drag_1_s, _LEAST_SPREAD):.2f} 1/s",
-            f"{estimate.residual_m_s2:.2f} m/s² of acceleration unexplained",
-        ]
 
-    def _numbers(self) -> ManoeuvreNumbers:
-        analysis, hover = self.analysis, self.analysis.hover
-        mean, deviation = analysis.estimate.mean, analysis.estimate.deviation
-        values = {
-            each: EstimatedValue(mean=getattr(mean, each), deviation=getattr(deviation, each)) for each in _FITTED
-        }
-        return ManoeuvreNumbers(
-            behaviour=LoggedBehaviour.model_validate(analysis.behaviour, from_attributes=True),
-            vehicle=EstimatedVehicle(
-                **values,
-                assumed_hover_throttle=analysis.loop.assumed_hover_throttle,
-                residual_m_s2=analysis.estimate.residual_m_s2,
-            ),
-            assessments=[_assessed(each) for each in analysis.assessments],
-            proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
-            at_limit=list(analysis.at_limit),
-            hover=None if hover is None else HoverSetting.model_validate(hover, from_attributes=True),
-        )
+def _numbers(analysis: Analysis) -> ManoeuvreNumbers:
+    mean, deviation = analysis.estimate.mean, analysis.estimate.deviation
+    values = {each: EstimatedValue(mean=getattr(mean, each), deviation=getattr(deviation, each)) for each in _FITTED}
+    return ManoeuvreNumbers.view_of(
+        analysis,
+        vehicle=EstimatedVehicle(
+            **values,
+            assumed_hover_throttle=analysis.loop.assumed_hover_throttle,
+            residual_m_s2=analysis.estimate.residual_m_s2,
+        ),
+        assessments=[_assessed(each) for each in analysis.assessments],
+        proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
+    )
 
 
 def _flight(analysis: Analysis) -> list[str]:
@@ -156,7 +139,7 @@ def _row(each: Assessment) -> list[str]:
     ]
 
 
-def _notes(analysis: Analysis) -> list[str]:
+def _notes(analysis: Analysis, assumed: Sequence[str]) -> list[str]:
     texts = analysis.loop.texts
     late = f", with {1e3 * EXTRA_LAG_S:.0f} ms of extra {texts.lateness}; a proposal has at least {REQUIRED_MARGIN:g}."
     hover = analysis.hover
@@ -172,11 +155,8 @@ def _notes(analysis: Analysis) -> list[str]:
             else []
         ),
         *([_LOAD] if analysis.proposed else []),
+        *([f"Not in the log, and assumed to have the firmware's default: {', '.join(assumed)}."] if assumed else []),
     ]
-
-
-def _assumptions(assumed: Sequence[str]) -> list[str]:
-    return [f"Not in the log, and assumed to have the firmware's default: {', '.join(assumed)}."] if assumed else []
 
 
 _LOAD: Final = "Load the gains on the ground. Fly them first at a safe height, ready to take over."

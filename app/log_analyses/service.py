@@ -21,9 +21,9 @@ def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> Log
     """
     from app.log_analyses.content import analyze_content  # noqa: PLC0415 - imports every reader and model
 
-    analysed = run_limited(FILE, analyze_content, content, companion, name)
-    figures = {theme: figure_card(card_of(PanelsFigure(analysed.plot, theme))) for theme in get_args(ThemeName)}
-    return LogAnalysis(**dict(analysed.answer), figures=figures)
+    answer, plot = run_limited(FILE, analyze_content, content, companion, name)
+    figures = {theme: figure_card(card_of(PanelsFigure(plot, theme))) for theme in get_args(ThemeName)}
+    return LogAnalysis(**dict(answer), figures=figures)
 
 
 def read_upload(content: bytes, companion: bytes | None, *, name: str) -> "list[Takeoff] | CopterStart":

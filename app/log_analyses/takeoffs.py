@@ -1,14 +1,12 @@
 """The answer of a log of takeoffs under Paparazzi, for a person: its facts, table, notes, airframe section, figure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
 from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.core.errors import Problem, TrajectoryError
-from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
 from app.core.records.trajectory import Trajectory
@@ -16,7 +14,6 @@ from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, Takeof
 from app.figures.panels import Line, Panel, Plot, Style
 from app.figures.scale import thinned
 from app.log_analyses.schemas import (
-    FittedValue,
     GainsInTakeoff,
     GainsTable,
     LogAnswer,
@@ -51,77 +48,68 @@ def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeof
     return known
 
 
-@dataclass(frozen=True, slots=True)
-class AnalysedTakeoffs:
-    """An analysis, and the log's file name."""
+def answer_of(analysis: TakeoffAnalysis, file_name: str) -> LogAnswer:
+    """The answer in facts and numbers."""
+    return LogAnswer(
+        file_name=file_name,
+        autopilot=_AUTOPILOT.title,
+        answer=analysis.answer,
+        proposes=analysis.proposed is not None,
+        starts_campaign=True,
+        experiment=None,
+        flight=_flight(analysis),
+        vehicle=_vehicle(analysis),
+        gains=_table(analysis),
+        notes=_notes(analysis),
+        parameter_file=_airframe_section(analysis, file_name),
+        numbers=_numbers(analysis),
+    )
 
-    analysis: TakeoffAnalysis
-    file_name: str
 
-    @property
-    def answer(self) -> LogAnswer:
-        """The answer in facts and numbers."""
-        analysis = self.analysis
-        return LogAnswer(
-            file_name=self.file_name,
-            autopilot=_AUTOPILOT.title,
-            answer=analysis.answer,
-            proposes=analysis.proposed is not None,
-            starts_campaign=True,
-            experiment=None,
-            flight=_flight(analysis),
-            vehicle=_vehicle(analysis),
-            gains=_table(analysis),
-            notes=_notes(analysis),
-            parameter_file=self._airframe_section(),
-            numbers=_numbers(analysis),
-        )
+def plot_of(analysis: TakeoffAnalysis) -> Plot:
+    """The best takeoff beside its prediction: altitude, and deviation from 3 m."""
+    gains = (analysis.proposed or analysis.assessments[0]).gains
+    best, predicted = analysis.best.trajectory, analysis.predicted
+    goal_m = float(Experiment().set_point(best.time_s[-1:])[0])
+    which = f"Predicted with the {'proposed' if analysis.proposed else 'same'} gains"
 
-    @property
-    def plot(self) -> Plot:
-        """The best takeoff beside its prediction: altitude, and deviation from 3 m."""
-        analysis = self.analysis
-        gains = (analysis.proposed or analysis.assessments[0]).gains
-        best, predicted = analysis.best.trajectory, analysis.predicted
-        goal_m = float(Experiment().set_point(best.time_s[-1:])[0])
-        which = f"Predicted with the {'proposed' if analysis.proposed else 'same'} gains"
+    def line(name: str, style: Style, record: Trajectory, offset_m: float) -> Line:
+        shown = (record.time_s >= 0.0) & (record.time_s <= analysis.window_s)
+        x, y = thinned(record.time_s[shown], record["altitude_m"][shown] - offset_m, _POINTS)
+        return Line(name=name, style=style, x=tuple(x), y=tuple(y))
 
-        def line(name: str, style: Style, record: Trajectory, offset_m: float) -> Line:
-            shown = (record.time_s >= 0.0) & (record.time_s <= analysis.window_s)
-            x, y = thinned(record.time_s[shown], record["altitude_m"][shown] - offset_m, _POINTS)
-            return Line(name=name, style=style, x=tuple(x), y=tuple(y))
+    def lines(offset_m: float) -> tuple[Line, ...]:
+        return line("Flown", "measured", best, offset_m), line(which, "model", predicted, offset_m)
 
-        def lines(offset_m: float) -> tuple[Line, ...]:
-            return line("Flown", "measured", best, offset_m), line(which, "model", predicted, offset_m)
+    goal = Line(name="Set point", style="goal", x=(0.0, analysis.window_s), y=(goal_m, goal_m))
+    return Plot(
+        title="The takeoff and its prediction",
+        summary=f"Altitude and deviation from {goal_m:g} m as flown, and as predicted with {format_gains(gains)}.",
+        x_title="Time since the command (s)",
+        panels=(
+            Panel(y_title="Altitude (m)", digits=2, lines=(goal, *lines(0.0))),
+            Panel(y_title="Deviation (m)", digits=3, y_range=_SHOWN_M, lines=lines(goal_m)),
+        ),
+        x_range=(0.0, min(_SHOWN_S, analysis.window_s)),
+    )
 
-        goal = Line(name="Set point", style="goal", x=(0.0, analysis.window_s), y=(goal_m, goal_m))
-        return Plot(
-            title="The takeoff and its prediction",
-            summary=f"Altitude and deviation from {goal_m:g} m as flown, and as predicted with {format_gains(gains)}.",
-            x_title="Time since the command (s)",
-            panels=(
-                Panel(y_title="Altitude (m)", digits=2, lines=(goal, *lines(0.0))),
-                Panel(y_title="Deviation (m)", digits=3, y_range=_SHOWN_M, lines=lines(goal_m)),
-            ),
-            x_range=(0.0, min(_SHOWN_S, analysis.window_s)),
-        )
 
-    def _airframe_section(self) -> ParameterFile | None:
-        """The proposed gains as a section of an airframe file; None without a proposal."""
-        if self.analysis.proposed is None:
-            return None
-        flown = format_gains(self.analysis.assessments[0].gains)
-        file_name = self.file_name.replace("--", "-")
-        lines = [
-            f"<!-- Gainline, from {file_name}, flown with {flown}. Fly first with free space, ready to take over. -->",
-            '<section name="GUIDANCE_V" prefix="GUIDANCE_V_">',
-            *(
-                f'  <define name="HOVER_{name.upper()}" value="{value:g}"/>'
-                for name, value in self.analysis.proposed.gains.items()
-            ),
-            "</section>",
-        ]
-        return ParameterFile(name=f"{PurePath(self.file_name).stem}.xml", content="\n".join((*lines, "")))
+def _airframe_section(analysis: TakeoffAnalysis, file_name: str) -> ParameterFile | None:
+    """The proposed gains as a section of an airframe file; None without a proposal."""
+    if analysis.proposed is None:
+        return None
+    flown = format_gains(analysis.assessments[0].gains)
+    named = file_name.replace("--", "-")
+    lines = [
+        f"<!-- Gainline, from {named}, flown with {flown}. Fly first with free space, ready to take over. -->",
+        '<section name="GUIDANCE_V" prefix="GUIDANCE_V_">',
+        *(
+            f'  <define name="HOVER_{name.upper()}" value="{value:g}"/>'
+            for name, value in analysis.proposed.gains.items()
+        ),
+        "</section>",
+    ]
+    return ParameterFile(name=f"{PurePath(file_name).stem}.xml", content="\n".join((*lines, "")))
 
 
 def _flight(analysis: TakeoffAnalysis) -> list[str]:
@@ -145,11 +133,10 @@ def _flight(analysis: TakeoffAnalysis) -> list[str]:
 
 def _vehicle(analysis: TakeoffAnalysis) -> list[str]:
     identified = [each for each in analysis.fitted if each.standard_error < _IDENTIFIED_SHARE * each.prior_sd]
-    return [*map(_fitted, identified), f"{analysis.residual_m:.3f} m of altitude unexplained"]
-
-
-def _fitted(each: FittedParameter) -> str:
-    return f"{each.title.lower()} {plus_minus(each.value, each.standard_error, each.unit)}"
+    return [
+        *(f"{each.title.lower()} {plus_minus(each.value, each.standard_error, each.unit)}" for each in identified),
+        f"{analysis.residual_m:.3f} m of altitude unexplained",
+    ]
 
 
 def _table(analysis: TakeoffAnalysis) -> GainsTable:
@@ -189,8 +176,8 @@ _LOAD: Final = (
 
 def _numbers(analysis: TakeoffAnalysis) -> TakeoffNumbers:
     response = analysis.response
-    return TakeoffNumbers(
-        window_s=analysis.window_s,
+    return TakeoffNumbers.view_of(
+        analysis,
         takeoffs=list(analysis.numbers),
         best=analysis.best.number,
         error_m=analysis.best.error or 0.0,
@@ -198,8 +185,7 @@ def _numbers(analysis: TakeoffAnalysis) -> TakeoffNumbers:
         settling_time_s=None if response is None else response.settling_time_s,
         overshoot_m=None if response is None else response.overshoot,
         steady_state_error_m=None if response is None else response.steady_state_error,
-        vehicle=[FittedValue.model_validate(each, from_attributes=True) for each in analysis.fitted],
-        residual_m=analysis.residual_m,
+        vehicle=analysis.fitted,
         assessments=[_assessed(each) for each in analysis.assessments],
         proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
     )

@@ -146,10 +146,6 @@ def _value(text: str, line: int, column: str) -> float:
     """The value of a cell; NaN for a missing optional one."""
     if column not in _REQUIRED and text.strip().lower() in _MISSING:
         return math.nan
-    return _number(text, line, column)
-
-
-def _number(text: str, line: int, column: str) -> float:
     where = f"line {line}, column {column}"
     try:
         value = float(text)

@@ -5,7 +5,7 @@ and photos, limited to a file size that can still be sent.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Final, Protocol
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -16,7 +16,7 @@ from app.campaigns.statistics import CampaignStatistics
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
-from app.core.definition import OptionValue, with_defaults
+from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
 from app.core.policy import Gain, Gains
@@ -102,17 +102,6 @@ _STARTS: Final = {
 }
 
 
-class _Described(Protocol):
-    """A setting of an experiment, a strategy or a vehicle."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def unit(self) -> str: ...
-
-
 def describe_vehicle(
     campaign: Campaign, experiment: Experiment, identity: Identity | None, safe_gains: str
 ) -> tuple[Fact, ...]:
@@ -179,7 +168,7 @@ def experiment_of(campaign: Campaign) -> Experiment:
     return EXPERIMENTS[campaign.definition.experiment].configured(campaign.definition.experiment_options)
 
 
-def _options(chosen: Mapping[str, OptionValue], known: Iterable[_Described]) -> Iterator[Fact]:
+def _options(chosen: Mapping[str, OptionValue], known: Iterable[Option]) -> Iterator[Fact]:
     described = {each.name: each for each in known}
     for name, value in chosen.items():
         found = described.get(name)

@@ -21,6 +21,7 @@ from app.reproductions.f16_campaigns import (
     SHOWCASE_SEED,
     MethodResult,
     Showcase,
+    flights_to_optimum,
     showcase,
     start,
     study,
@@ -119,7 +120,7 @@ def _true_error(gains: Vector) -> float:
 
 def _showcase(shown: Showcase) -> Iterator[Row]:
     group = f"The paper's method on the model of seed {SHOWCASE_SEED}"
-    errors, near = np.array(shown.result.errors), shown.result.flights_to_optimum
+    errors, near = np.array(shown.errors), flights_to_optimum(shown.errors)
     steps = -np.diff(errors)
     yield Row(
         group=group,
@@ -192,11 +193,11 @@ def _methods(comparisons: Sequence[_Comparison], seeds: Sequence[int], on_progre
 
 
 def _method(found: MethodResult) -> Iterator[Row]:
-    share, flights = (EXPECTED | EXPECTED_NOISY)[found.method]
+    share, flights = (EXPECTED | EXPECTED_NOISY)[found.method.name]
     group = f"Methods over {len(found.campaigns)} models at ±{short_percent(found.perturbation)}"
     yield Row(
         group=group,
-        label=f"{found.title}: near the optimum",
+        label=f"{found.method.title}: near the optimum",
         unit="of models",
         measured=found.share,
         reference=share,
@@ -206,7 +207,7 @@ def _method(found: MethodResult) -> Iterator[Row]:
     if found.median_flights is not None:
         yield Row(
             group=group,
-            label=f"{found.title}: median flights",
+            label=f"{found.method.title}: median flights",
             unit="flights",
             measured=float(found.median_flights),
             reference=flights,
@@ -237,7 +238,7 @@ _FULL: Final = (
 
 def _figures(shown: Showcase) -> dict[str, Plot]:
     best = next(flight for flight in shown.flights if flight.number == shown.best)
-    errors = np.array(shown.result.errors)
+    errors = np.array(shown.errors)
     return {
         "figure2-left": _search_plot(np.array(shown.search_errors)),
         "figure2-right": _response_plot(

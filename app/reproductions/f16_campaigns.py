@@ -84,32 +84,27 @@ _ALL: Final = (
 METHODS: Final[Mapping[str, Method]] = MappingProxyType({method.name: method for method in _ALL})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CampaignResult:
-    """One campaign on the true system: the noise-free error of every flight, rad·s, in order."""
+Errors = tuple[float, ...]
+"""A campaign on the true system: the noise-free error of every flight, rad·s, in order."""
 
-    seed: int
-    errors: tuple[float, ...]
 
-    @property
-    def flights_to_optimum(self) -> int | None:
-        """Number of the first flight within 5 % of the true optimum; None if there is none."""
-        return next((n for n, error in enumerate(self.errors, 1) if error <= (1.0 + WITHIN) * BEST_ERROR), None)
+def flights_to_optimum(errors: Errors) -> int | None:
+    """Number of the first flight within 5 % of the true optimum; None if there is none."""
+    return next((n for n, error in enumerate(errors, 1) if error <= (1.0 + WITHIN) * BEST_ERROR), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodResult:
-    """Results of a method over the inaccurate models of one perturbation, by seed."""
+    """Campaigns of a method over the inaccurate models of one perturbation, by seed."""
 
-    method: str
-    title: str
+    method: Method
     perturbation: float
-    campaigns: tuple[CampaignResult, ...]
+    campaigns: tuple[Errors, ...]
 
     @property
     def flights(self) -> tuple[int, ...]:
         """Flights to within 5 % of the optimum, for the campaigns that reached it."""
-        return tuple(n for campaign in self.campaigns if (n := campaign.flights_to_optimum) is not None)
+        return tuple(n for errors in self.campaigns if (n := flights_to_optimum(errors)) is not None)
 
     @property
     def share(self) -> float:
@@ -146,10 +141,8 @@ class Showcase:
         return min(self.flights, key=lambda flight: (flight.error, flight.number)).number
 
     @property
-    def result(self) -> CampaignResult:
-        return CampaignResult(
-            seed=SHOWCASE_SEED, errors=tuple(flight.error for flight in self.flights if flight.error is not None)
-        )
+    def errors(self) -> Errors:
+        return tuple(flight.error for flight in self.flights if flight.error is not None)
 
 
 def study(
@@ -164,14 +157,13 @@ def study(
 
     Each campaign ends when it is within 5 % of the true optimum, has nothing to propose, or has flown `max_flights`.
     """
-    found: dict[tuple[str, int], CampaignResult] = {}
+    found: dict[tuple[str, int], Errors] = {}
     for seed, method in product(seeds, methods):
         found[method, seed] = _campaign(METHODS[method], perturbation, seed, max_flights)
         on_progress(len(found), len(seeds) * len(methods))
     return tuple(
         MethodResult(
-            method=method,
-            title=METHODS[method].title,
+            method=METHODS[method],
             perturbation=perturbation,
             campaigns=tuple(found[method, seed] for seed in seeds),
         )
@@ -205,12 +197,12 @@ def start(perturbation: float, seed: int) -> Optimum:
     return model_optimum(experiment, experiment.space, experiment.space.default)
 
 
-def _campaign(method: Method, perturbation: float, seed: int, max_flights: int) -> CampaignResult:
+def _campaign(method: Method, perturbation: float, seed: int, max_flights: int) -> Errors:
     if not method.strategy:
-        return CampaignResult(seed=seed, errors=_searched(start(perturbation, seed).gains))
+        return _searched(start(perturbation, seed).gains)
     definition = _definition(method, perturbation, seed, max_flights)
     flights = list(_flown(definition, method, until_near=True))
-    return CampaignResult(seed=seed, errors=tuple(_true_errors([flight.gains for flight in flights])))
+    return tuple(_true_errors([flight.gains for flight in flights]))
 
 
 def _definition(method: Method, perturbation: float, seed: int, max_flights: int) -> Definition:
@@ -257,7 +249,7 @@ class _NearError(Exception):
     """Raised when the search is within 5 % of the optimum."""
 
 
-def _searched(first: Vector) -> tuple[float, ...]:
+def _searched(first: Vector) -> Errors:
     """Nelder–Mead on the true system from the same start; every evaluation is a flight."""
     from scipy.optimize import minimize
 

@@ -16,10 +16,10 @@ from app.core.errors import TrajectoryError
 from app.core.policy import Gains, PolicySpace, Vector
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.gate import check_policy
-from app.core.tuning.predictions import prediction_of
 from app.core.tuning.proposals import next_proposal
 from bench.copter_steps import Vehicle, least_error
 from bench.copters.campaign_flights import RIGS
+from bench.predictions import prediction_of
 from bench.targets.flying import BudgetSpentError
 from bench.targets.methods import SEARCHES
 

@@ -23,10 +23,11 @@ from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.corrected_model import start_gains
 from app.core.tuning.definition_checks import check_definition
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
-from app.core.tuning.predictions import prediction_of
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies import STRATEGIES, gradient
+from bench.predictions import prediction_of
 from bench.targets.flying import EXPERIMENT, SPACE, Method, Tuning
 
 if TYPE_CHECKING:
@@ -201,7 +202,8 @@ def _as_published(*, scaled: bool, start: StartKind) -> Method:
                 allows=lambda *_: True,
                 known_distribution=lambda experiment, _: prior_distribution(experiment),
             ):
-                proposal = STRATEGIES["gradient"].propose(definition, EXPERIMENT, SPACE, history)
+                known = Evidence(definition=definition, experiment=EXPERIMENT, flights=history)
+                proposal = STRATEGIES["gradient"].propose(known)
             if proposal.kind == "none":
                 tuning.settle(SPACE.vector(proposal.gains), "nothing better")
                 return

@@ -98,7 +98,7 @@ def test_a_flight_in_wind_gets_a_proposal(flown: RecordedFlight) -> None:
 @pytest.mark.complete
 def test_steps_to_the_side_at_one_altitude_are_described_without_a_proposal() -> None:
     """The only altitude change is the end of the takeoff."""
-    answer = analyze_content(recorded("arducopter_lateral_steps.bin"), None, "lateral.bin").answer
+    answer, _ = analyze_content(recorded("arducopter_lateral_steps.bin"), None, "lateral.bin")
     assert not answer.proposes
     assert "no altitude change both begins and ends in it" in answer.answer
     assert answer.flight[:2] == ["70 s analysed", "reference moves by 2.0 m"]

@@ -24,7 +24,7 @@ from app.reproductions.f16 import (
     _starts,
     run_f16,
 )
-from app.reproductions.f16_campaigns import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase, truth
+from app.reproductions.f16_campaigns import BEST_ERROR, METHODS, MethodResult, Showcase, showcase, truth
 
 
 @pytest.fixture(scope="module")
@@ -96,8 +96,8 @@ def test_without_the_bounds_the_true_system_is_flown_far_better() -> None:
 
 
 def test_a_method_is_told_by_the_share_that_comes_near_and_its_median_flights() -> None:
-    campaigns = tuple(CampaignResult(seed=seed, errors=errors) for seed, errors in enumerate([(1.0, 0.205), (1.0,)]))
-    rows = list(_method(MethodResult(method="identified", title="Identified", perturbation=0.45, campaigns=campaigns)))
+    campaigns = ((1.0, 0.205), (1.0,))
+    rows = list(_method(MethodResult(method=METHODS["identified"], perturbation=0.45, campaigns=campaigns)))
     assert [(row.measured, row.reference, row.note) for row in rows] == [
         (0.5, 1.0, "1 of 2"),
         (2.0, 2.0, "of those that reached it"),

@@ -1,8 +1,7 @@
 """The answer to a log: how the altitude loop behaves, the vehicle behind it, and gains for it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -153,13 +152,11 @@ def analyze(flight: LoggedFlight) -> Analysis:
     Raises TrajectoryError if the flight contains nothing to learn from, or something that no copter of the model does.
     """
     loop, behaviour = flight.loop, _behaviour(flight)
-    _require_altitude_changes(flight, behaviour)
-    _require_signals(flight)
-    _require_own_controller(flight)
+    _require_none(loop, _obstacles(flight, behaviour))
     estimate = fit_copter(flight)
     assess = _assessor(flight, estimate)
     present = assess("As flown", loop.gains)
-    _require_likeness(loop, behaviour, estimate, present)
+    _require_none(loop, _differences(behaviour, estimate, present))
     hover = advise_hover(loop, estimate.mean.hover_throttle)
     if hover is not None and hover.is_outside:
         flight = flight.with_hover(hover.proposed)
@@ -188,7 +185,21 @@ def analyze(flight: LoggedFlight) -> Analysis:
 
 def _assessor(flight: LoggedFlight, estimate: CopterEstimate) -> Callable[[str, Mapping[str, float]], Assessment]:
     """What assesses a named gain set."""
-    return partial(_assess, flight, FlightModel(flight, estimate.draws), FlightModel(flight, [estimate.mean]), estimate)
+    flown, model = flight.loop, FlightModel(flight, estimate.draws)
+    likeliest = FlightModel(flight, [estimate.mean])
+    activity = likeliest.fly(flown)[1]
+
+    def assess(name: str, gains: Mapping[str, float]) -> Assessment:
+        loop = flown.with_gains(gains)
+        return Assessment(
+            name=name,
+            gains=flown.named(gains),
+            prediction=model.predict(loop),
+            activity=likeliest.fly(loop)[1] / activity,
+            margin=gain_margin(loop, estimate.mean),
+        )
+
+    return assess
 
 
 def _is_better(proposed: Assessment, present: Assessment) -> bool:
@@ -236,21 +247,37 @@ def _behaviour(flight: LoggedFlight) -> Behaviour:
     )
 
 
-def _require_altitude_changes(flight: LoggedFlight, behaviour: Behaviour) -> None:
-    loop = flight.loop
+def _require_none(loop: AltitudeLoop, reasons: Iterator[str]) -> None:
+    """Raise TrajectoryError with the first reason, if there is one."""
+    if (reason := next(reasons, None)) is not None:
+        problems = (Problem("file", reason),)
+        raise TrajectoryError("The log cannot be analysed.", hint=loop.texts.what_to_fly, problems=problems)
+
+
+def _obstacles(flight: LoggedFlight, behaviour: Behaviour) -> Iterator[str]:
+    """Why nothing can be learned from a flight: altitude hardly changes, acceleration and throttle are constant, as in
+    messages that nobody filled in, or the climb rate target is not what the replica's position controller computes."""
     if behaviour.duration_s < _SHORTEST_S:
-        raise _unanswered(
-            loop,
-            f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed{_in_hover(flight)}",
-        )
+        yield f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed{_in_hover(flight)}"
     if behaviour.reference_range_m < _LEAST_CHANGE_M:
-        raise _unanswered(
-            loop,
+        yield (
             f"has no altitude changes: the reference moves by {behaviour.reference_range_m:.2f} m, and "
-            f"{_LEAST_CHANGE_M:g} m are needed{_in_hover(flight)}",
+            f"{_LEAST_CHANGE_M:g} m are needed{_in_hover(flight)}"
         )
     if behaviour.saturated_share > _LARGEST_SATURATION:
-        raise _unanswered(loop, f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows")
+        yield f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows"
+    for each in flight.segments:
+        signals = (("acceleration", each.a_m_s2), ("throttle", each.throttle_filtered))
+        if constant := [name for name, values in signals if np.ptp(values) < _LEAST_VARIATION]:
+            yield f"has a constant {' and '.join(constant)}: nothing can be learned from it"
+    loop = flight.loop
+    apart = np.concatenate([np.abs(loop.climb_rate_targets(each) - each.v_t_m_s) for each in flight.segments])
+    differing = int(np.sum(apart > loop.target_tolerance_m_s))
+    if differing > _OTHER_CONTROLLER_SHARE * len(apart):
+        yield (
+            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {len(apart)} "
+            f"rows: {loop.texts.other_controller}"
+        )
 
 
 def _in_hover(flight: LoggedFlight) -> str:
@@ -261,31 +288,6 @@ def _in_hover(flight: LoggedFlight) -> str:
         for each in flight.segments
     ])  # fmt: skip
     return f"; the vehicle hovers at a throttle of {np.median(throttle):.2f}" if throttle.size else ""
-
-
-def _require_signals(flight: LoggedFlight) -> None:
-    """Require that acceleration and throttle were measured: a constant is a message that nobody filled in."""
-    for each in flight.segments:
-        constant = [
-            name
-            for name, values in (("acceleration", each.a_m_s2), ("throttle", each.throttle_filtered))
-            if np.ptp(values) < _LEAST_VARIATION
-        ]
-        if constant:
-            raise _unanswered(flight.loop, f"has a constant {' and '.join(constant)}: nothing can be learned from it")
-
-
-def _require_own_controller(flight: LoggedFlight) -> None:
-    """Require that the climb rate target is what the replica's position controller computes."""
-    loop = flight.loop
-    apart = np.concatenate([np.abs(loop.climb_rate_targets(each) - each.v_t_m_s) for each in flight.segments])
-    differing = int(np.sum(apart > loop.target_tolerance_m_s))
-    if differing > _OTHER_CONTROLLER_SHARE * len(apart):
-        raise _unanswered(
-            loop,
-            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {len(apart)} "
-            f"rows: {loop.texts.other_controller}",
-        )
 
 
 def find_unexplained(estimate: CopterEstimate) -> str | None:
@@ -304,15 +306,15 @@ def is_alike(flown_m: float, modelled_m: float) -> bool:
     return abs(modelled_m - flown_m) <= max(least_m, share * flown_m)
 
 
-def _require_likeness(loop: AltitudeLoop, behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> None:
+def _differences(behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> Iterator[str]:
+    """Why the flight is not that of a copter of the model."""
     if (why := find_unexplained(estimate)) is not None:
-        raise _unanswered(loop, why)
+        yield why
     if not is_alike(behaviour.error_m, present.prediction.error_m):
-        raise _unanswered(
-            loop,
+        yield (
             f"has a deviation of {1e3 * behaviour.error_m:.1f} mm, where the gains in the log make the fitted vehicle "
             f"deviate by {1e3 * present.prediction.error_m:.1f} mm: perhaps it flew with other gains, for instance "
-            "set by a tuning knob, or something else replaced the controller",
+            "set by a tuning knob, or something else replaced the controller"
         )
 
 
@@ -337,28 +339,3 @@ def _begins_and_ends_a_change(flight: LoggedFlight) -> bool:
     rises = [float(np.max(each - np.minimum.accumulate(each))) for each in rates]
     falls = [float(np.max(np.maximum.accumulate(each) - each)) for each in rates]
     return min(max(rises), max(falls)) >= _LEAST_RATE_CHANGE_M_S
-
-
-def _assess(
-    flight: LoggedFlight,
-    model: FlightModel,
-    likeliest: FlightModel,
-    estimate: CopterEstimate,
-    name: str,
-    gains: Mapping[str, float],
-) -> Assessment:
-    flown = flight.loop
-    loop = flown.with_gains(gains)
-    return Assessment(
-        name=name,
-        gains=flown.named(gains),
-        prediction=model.predict(loop),
-        activity=likeliest.fly(loop)[1] / likeliest.fly(flown)[1],
-        margin=gain_margin(loop, estimate.mean),
-    )
-
-
-def _unanswered(loop: AltitudeLoop, reason: str) -> TrajectoryError:
-    return TrajectoryError(
-        "The log cannot be analysed.", hint=loop.texts.what_to_fly, problems=(Problem("file", reason),)
-    )

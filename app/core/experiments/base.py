@@ -99,12 +99,16 @@ class ParameterDistribution:
         sd = np.sqrt(np.maximum(variances, 0.0))
         edge = 0.5 - 0.5 * _PROBABILITY_WITHIN
         normal = ndtri(edge + unit * _PROBABILITY_WITHIN)
-        lower = [parameter.lower for parameter in experiment.model_parameters]
-        upper = [parameter.upper for parameter in experiment.model_parameters]
-        return np.asarray(np.clip(np.array(self.mean) + (normal * sd) @ axes.T, lower, upper))
+        return np.asarray(np.clip(np.array(self.mean) + (normal * sd) @ axes.T, *experiment.limits))
 
 
 _PROBABILITY_WITHIN: Final = 0.9544997361036416
+
+
+def normal_distribution(mean: Vector, covariance: "Matrix", origin: str) -> ParameterDistribution:
+    """The distribution with this mean, shape (m,), and covariance, (m, m)."""
+    rows = tuple(tuple(row) for row in covariance.tolist())
+    return ParameterDistribution(mean=tuple(mean.tolist()), covariance=rows, origin=origin)
 
 
 NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
@@ -119,11 +123,7 @@ def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
     if modelled is None:
         return NO_PARAMETERS
     sd: Vector = np.array([parameter.known_within for parameter in modelled.model_parameters]) / WIDEST_SD
-    return ParameterDistribution(
-        mean=tuple(float(value) for value in modelled.nominal_model),
-        covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()),
-        origin="the data sheet",
-    )
+    return normal_distribution(modelled.nominal_model, np.diag(sd**2), origin="the data sheet")
 
 
 Matrix = NDArray[np.float64]
@@ -184,16 +184,6 @@ def fitted_parameters(
             prior_sd=parameter.prior_sd,
         )
         for parameter, value, error in zip(parameters, values, errors, strict=True)
-    )
-
-
-def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: Vector) -> tuple[ModelParameter, ...]:
-    """The parameters with `mean` and `sd`, shape (m,), in place of the data sheet's values."""
-    return tuple(
-        replace(
-            parameter, nominal=float(value), prior_sd=float(spread), known_within=2.0 * float(spread), expected=None
-        )
-        for parameter, value, spread in zip(parameters, mean, sd, strict=True)
     )
 
 
@@ -274,9 +264,9 @@ class Experiment(ABC):
     def grid_s(self) -> Samples:
         """Times of a model run from the command to the end of the window, shape (n,)."""
 
-    @abstractmethod
     def set_point(self, time_s: Samples) -> Samples:
-        """Set point of the scored output, same shape as `time_s`; zero before the command."""
+        """Set point of the scored output, same shape as `time_s`; zero before the command, and without set points."""
+        return np.zeros_like(time_s) if self.set_points is None else self.set_points.at(time_s)
 
     @abstractmethod
     def errors(self, outputs: Matrix) -> Vector:
@@ -309,14 +299,36 @@ class ModelledExperiment(Experiment):
         """Nominal parameters, shape (m,), in the order of `model_parameters`."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
 
+    @property
+    def limits(self) -> tuple[Vector, Vector]:
+        """Lowest and highest parameters, shape (m,) each."""
+        parameters = self.model_parameters
+        return np.array([each.lower for each in parameters]), np.array([each.upper for each in parameters])
+
+    @property
+    def prior_sd(self) -> Vector:
+        """Prior standard deviations of the parameters in a fit, shape (m,)."""
+        return np.array([parameter.prior_sd for parameter in self.model_parameters])
+
     def least_model_error(self, base: Trajectory) -> float:  # noqa: ARG002 - not without a resolution of its own
         """Standard deviation, in the error's unit, by which a prediction of even a fitted model is wrong, beside a
         relative error, for flights recorded as `base` was."""
         return 0.0
 
     @abstractmethod
+    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
+        """The same experiment on another model."""
+
     def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd` have shape (m,)."""
+        """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd`, shape (m,), are in
+        place of the data sheet's values."""
+        fitted = zip(self.model_parameters, mean.tolist(), sd.tolist(), strict=True)
+        return self.with_parameters(
+            tuple(
+                replace(parameter, nominal=value, prior_sd=spread, known_within=2.0 * spread, expected=None)
+                for parameter, value, spread in fitted
+            )
+        )
 
     def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
         """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.
@@ -341,16 +353,17 @@ class ModelledExperiment(Experiment):
         gains (k, g), model (k, m) or (m,) → (k, n) on `grid_s`.
         """
 
-    @abstractmethod
-    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
         """Difference between each recorded step and the model's step from the same state and command.
 
-        In the experiment's own layout for `disturbed_outputs`. None if the record lacks the required channels.
+        In the experiment's own layout for `disturbed_outputs`. None if the record lacks the required channels, and for
+        an experiment whose flights correct the model of the strategy `calibrated` alone.
         """
+        return None
 
-    @abstractmethod
-    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:  # noqa: ARG002
         """`outputs` with the disturbances added to the model's state at the same times, inside the control loop."""
+        return self.outputs(gains, model)
 
     @abstractmethod
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:

@@ -26,7 +26,6 @@ from app.core.experiments.base import (
     ModelParameter,
     ParameterDistribution,
     SimplexSearch,
-    informed_parameters,
 )
 from app.core.experiments.copter_steps_hazards import (
     COPTERS,
@@ -157,9 +156,9 @@ class CopterSteps(ModelledExperiment):
         changed.loop(self.space.default)
         return changed
 
-    def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model: mean and standard deviation, shape (4,)."""
-        return self._with(model_parameters=informed_parameters(self.model_parameters, mean, sd))
+    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
+        """The same steps of another copter."""
+        return self._with(model_parameters=model_parameters)
 
     def _with(
         self,
@@ -180,10 +179,6 @@ class CopterSteps(ModelledExperiment):
     def grid_s(self) -> Samples:
         """Every 20 ms from the command to the first instant at or past the end of the window, shape (n,)."""
         return np.arange(int(np.ceil(self.window_s * GRID_HZ)) + 1) / GRID_HZ
-
-    def set_point(self, time_s: Samples) -> Samples:
-        """The altitude asked for at each time, m."""
-        return self.set_points.at(time_s)
 
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute distance from the reference, m, over the windows of the steps: (k, n) → (k,)."""
@@ -212,14 +207,6 @@ class CopterSteps(ModelledExperiment):
             after = grid_s >= steps_s[0]
             altitudes[row, after] = np.interp(grid_s[after], steps_s, flown[:, FLOWN.index("z_m")])
         return altitudes
-
-    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
-        """None: a flight's disturbances act on the model of the strategy `calibrated` alone."""
-        return None
-
-    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:  # noqa: ARG002
-        """`outputs`: there are no disturbances."""
-        return self.outputs(gains, model)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """Altitudes of simulated flights, and the margin from ringing, on a few copters of the distribution; nothing is

@@ -15,7 +15,6 @@ from app.core.experiments.base import (
     ParameterDistribution,
     Scatter,
     SimplexSearch,
-    informed_parameters,
 )
 from app.core.models.f16 import (
     ALTITUDE,
@@ -119,13 +118,7 @@ class PitchTracking(ModelledExperiment):
             lower=0.0,
             upper=0.8,
         ),
-        Option(
-            name="model_seed",
-            title="Seed that selects the inaccurate model",
-            default=0,
-            lower=0,
-            upper=2**32 - 1,
-        ),
+        Option(name="model_seed", title="Seed that selects the inaccurate model", default=0, lower=0, upper=2**32 - 1),
     )
 
     def __init__(
@@ -142,18 +135,14 @@ class PitchTracking(ModelledExperiment):
         """The experiment with another inaccurate model; settings missing in `options` have their defaults."""
         return type(self)(options)
 
-    def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another aircraft's fitted model: mean and standard deviation, shape (19,)."""
-        return type(self)(self._options, informed_parameters(self.model_parameters, mean, sd))
+    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
+        """The same experiment on another aircraft."""
+        return type(self)(self._options, model_parameters)
 
     @property
     def grid_s(self) -> Samples:
         """Every 0.02 s for a minute: shape (3001,)."""
         return np.arange(_SAMPLES, dtype=np.float64) * STEP_S
-
-    def set_point(self, time_s: Samples) -> Samples:
-        """Zero error at any time."""
-        return np.zeros_like(time_s)
 
     def systems(self, model: Matrix | Vector) -> Matrix:
         """[A | B] of model parameters (…, 19), in the source's units: shape (…, 5, 7)."""

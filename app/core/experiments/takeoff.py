@@ -45,10 +45,6 @@ _SCATTER_M: Final = 0.0105
 SET_POINTS: Final = SetPoints((0.0,), (TARGET_M,))
 
 
-def _window_of(options: Mapping[str, OptionValue]) -> float:
-    return float(with_defaults(options, OPTIONS)["window_s"])
-
-
 def _scatter(window_s: float, degrees_of_freedom: float, *, measured: bool = True) -> Scatter:
     """The scatter over the default window. Most of it arises in the climb, so it grows as 1/window for shorter
     ones; for longer ones it is kept, because with soft gains it hardly falls."""
@@ -92,7 +88,7 @@ class Takeoff(VerticalLoop):
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The takeoff with another window; itself if that is its own."""
-        window_s = _window_of(options)
+        window_s = float(with_defaults(options, OPTIONS)["window_s"])
         return self if window_s == self.window_s else type(self)(self.model_parameters, window_s=window_s)
 
     def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
@@ -163,10 +159,6 @@ class CopterTakeoff(Experiment):
     def grid_s(self) -> Samples:
         """The same as the paper's takeoff."""
         return self._paper.grid_s
-
-    def set_point(self, time_s: Samples) -> Samples:
-        """3 m from the command on."""
-        return self._paper.set_point(time_s)
 
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""

@@ -2,9 +2,8 @@
 parameters, and the hazards. An experiment adds its set points and its performance measure.
 """
 
-from abc import abstractmethod
 from functools import lru_cache
-from typing import ClassVar, Final, Self
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from app.core.experiments.base import (
     ModelParameter,
     ParameterDistribution,
     SimplexSearch,
-    informed_parameters,
 )
 from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights, check_wrapping
 from app.core.models.set_points import SetPoints
@@ -92,22 +90,10 @@ class VerticalLoop(ModelledExperiment):
         self.window_s = window_s
         self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
 
-    @abstractmethod
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same experiment on another model."""
-
-    def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
-        return self.with_parameters(informed_parameters(self.model_parameters, mean, sd))
-
     @property
     def grid_s(self) -> Samples:
         """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
         return np.arange(self._samples) / RATE_HZ
-
-    def set_point(self, time_s: Samples) -> Samples:
-        """The altitude asked for at each time, m."""
-        return self.set_points.at(time_s)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""

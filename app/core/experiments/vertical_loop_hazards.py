@@ -244,15 +244,14 @@ def _abort(place: int, runs: Runs, allowed: "Matrix", limits: Vector, parameters
 
 def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
     """Description of the vehicle, and the time of the event, counted from the command."""
-    return ", ".join(_case_parts(parameters, model, step, event))
-
-
-def _case_parts(parameters: Sequence["ModelParameter"], model: Vector, step: float | None, event: str) -> Iterator[str]:
-    for parameter, value in zip(parameters, model.tolist(), strict=True):
-        if value or parameter.nominal:
-            yield f"{parameter.title.lower()} {short_value(value, parameter.unit)}"
+    parts = [
+        f"{parameter.title.lower()} {short_value(value, parameter.unit)}"
+        for parameter, value in zip(parameters, model.tolist(), strict=True)
+        if value or parameter.nominal
+    ]
     if step is not None:
-        yield f"{event} at {model[START_LATENCY_S] + step * STEP_S:.1f} s"
+        parts.append(f"{event} at {model[START_LATENCY_S] + step * STEP_S:.1f} s")
+    return ", ".join(parts)
 
 
 def short_value(value: float, unit: str) -> str:

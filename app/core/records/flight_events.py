@@ -41,7 +41,13 @@ def flight_events(
     time_s, channels = trajectory.time_s, trajectory.channels
     gaps = _gaps(time_s)
     others_s = [begin_s for begin_s in glitches_s if begin_s not in dict(gaps)]
-    found = [FlightEvent(0.0, "Command"), *_glitches(others_s), *_named_gaps(gaps)]
+    glitches = [FlightEvent(begin_s, "Glitch") for begin_s in others_s]
+    lost = [FlightEvent(begin_s, f"No data for {lasts_s:.1f} s") for begin_s, lasts_s in gaps]
+    found = [
+        FlightEvent(0.0, "Command"),
+        *_few(glitches, f"{len(glitches)} glitches"),
+        *_few(lost, f"No data, {len(lost)} times"),
+    ]
     if "altitude_m" not in channels or not len(time_s):
         return tuple(sorted(found, key=_time))
     is_commanded = time_s >= 0.0
@@ -69,10 +75,9 @@ def _time(event: FlightEvent) -> float:
     return event.time_s
 
 
-def _glitches(begin_s: Sequence[float]) -> list[FlightEvent]:
-    if len(begin_s) > _NAMED:
-        return [FlightEvent(min(begin_s), f"{len(begin_s)} glitches")]
-    return [FlightEvent(time_s, "Glitch") for time_s in begin_s]
+def _few(events: list[FlightEvent], together: str) -> list[FlightEvent]:
+    """The events, or one for all of them if they are many."""
+    return events if len(events) <= _NAMED else [FlightEvent(min(map(_time, events)), together)]
 
 
 def _gaps(time_s: Samples) -> list[tuple[float, float]]:
@@ -82,12 +87,6 @@ def _gaps(time_s: Samples) -> list[tuple[float, float]]:
         return []
     places = np.flatnonzero(intervals_s > max(_GAP_S, _GAP_INTERVALS * float(np.median(intervals_s))))
     return [(float(time_s[place]), float(intervals_s[place])) for place in places]
-
-
-def _named_gaps(gaps: Sequence[tuple[float, float]]) -> list[FlightEvent]:
-    if len(gaps) > _NAMED:
-        return [FlightEvent(gaps[0][0], f"No data, {len(gaps)} times")]
-    return [FlightEvent(begin_s, f"No data for {lasts_s:.1f} s") for begin_s, lasts_s in gaps]
 
 
 def _abort(trajectory: Trajectory) -> int | None:

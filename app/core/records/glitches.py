@@ -106,7 +106,10 @@ def find_glitches(experiment: ScoredOutput, trajectory: Trajectory) -> tuple[Gli
         excess = _excess(time_s, values, physics)
         frozen = _frozen(time_s, values, channels.get(physics.rate), excess, physics)
         found.extend(_held(time_s, values, physics, mark) for mark in frozen)
-        jumps = [mark for mark in _jumps(time_s, excess) if _apart(mark, [*gaps, *frozen])]
+        others = [*gaps, *frozen]
+        jumps = [
+            mark for mark in _jumps(time_s, excess) if all(mark[1] < first or mark[0] > last for first, last in others)
+        ]
         found.extend(_jumped(time_s, values, physics, mark) for mark in jumps)
         if physics.second in channels:
             found.extend(_disagreements(time_s, values, channels[physics.second], physics))
@@ -135,10 +138,6 @@ def _sound(trajectory: Trajectory, output: str) -> bool:
         and bool(np.isfinite(values).all() and np.isfinite(time_s).all())
         and bool((np.diff(time_s) > 0.0).all())
     )
-
-
-def _apart(mark: tuple[int, int], others: Marks) -> bool:
-    return all(mark[1] < first or mark[0] > last for first, last in others)
 
 
 def _gap(time_s: Samples, first: int, last: int) -> Glitch:

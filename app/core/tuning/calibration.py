@@ -26,7 +26,9 @@ from app.core.experiments.base import (
     ModelledExperiment,
     ParameterDistribution,
     fitted_parameters,
+    normal_distribution,
 )
+from app.core.formatting import count
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples
 from app.core.tuning.corrected_model import resample_to_grid
@@ -73,14 +75,9 @@ class Calibration:
 
     def spread(self) -> ParameterDistribution:
         """Distribution of the vehicle's parameters after the fit, including the model error."""
-        known = np.diag(self.covariance) + (_MODEL_ERROR_SD * _prior_sd(self.experiment)) ** 2
+        known = np.diag(self.covariance) + (_MODEL_ERROR_SD * self.experiment.prior_sd) ** 2
         covariance = self.covariance + np.diag(known - np.diag(self.covariance))
-        flights = f"{len(self.numbers)} flight{'s' if len(self.numbers) > 1 else ''}"
-        return ParameterDistribution(
-            mean=tuple(self.model.tolist()),
-            covariance=tuple(tuple(row) for row in covariance.tolist()),
-            origin=f"the calibration on {flights}",
-        )
+        return normal_distribution(self.model, covariance, f"the calibration on {count(len(self.numbers), 'flight')}")
 
     def plausible(self, *, runs: int, width: float = 1.0, next_flight: bool = False) -> Matrix:
         """Return `runs` models (a power of two), `width` standard deviations from the fitted one.
@@ -97,7 +94,8 @@ class Calibration:
         shifts = np.zeros((runs, m))
         used = min(runs - 1, m)
         shifts[:, :used] = width * hadamard(runs)[:, 1 : used + 1]
-        return _clipped(self.experiment, self.model + shifts @ np.linalg.cholesky(covariance).T)
+        models = self.model + shifts @ np.linalg.cholesky(covariance).T
+        return np.asarray(np.clip(models, *self.experiment.limits))
 
     @property
     def fitted(self) -> tuple[FittedParameter, ...]:
@@ -150,18 +148,8 @@ def _rounded(covariance: Matrix, sd: Vector) -> Matrix:
     return np.asarray((correlation + correlation.T) / 2.0 * np.outer(rounded, rounded))
 
 
-def _prior_sd(experiment: ModelledExperiment) -> Vector:
-    return np.array([parameter.prior_sd for parameter in experiment.model_parameters])
-
-
 def _flight_sd(experiment: ModelledExperiment) -> Vector:
     return np.array([parameter.flight_sd for parameter in experiment.model_parameters])
-
-
-def _clipped(experiment: ModelledExperiment, models: Matrix) -> Matrix:
-    lower = [parameter.lower for parameter in experiment.model_parameters]
-    upper = [parameter.upper for parameter in experiment.model_parameters]
-    return np.asarray(np.clip(models, lower, upper))
 
 
 class _Fit:
@@ -172,12 +160,10 @@ class _Fit:
     """
 
     def __init__(self, experiment: ModelledExperiment, flights: Sequence[Flight]) -> None:
-        parameters = experiment.model_parameters
         self.experiment = experiment
-        self.mean = np.array([parameter.prior_mean for parameter in parameters])
-        self.sd = _prior_sd(experiment)
-        self.lower = np.array([parameter.lower for parameter in parameters])
-        self.upper = np.array([parameter.upper for parameter in parameters])
+        self.mean = np.array([parameter.prior_mean for parameter in experiment.model_parameters])
+        self.sd = experiment.prior_sd
+        self.lower, self.upper = experiment.limits
         self.flight_sd = _flight_sd(experiment)
         self.own = np.flatnonzero(self.flight_sd)
         self.gains = np.array([experiment.space.vector(flight.gains) for flight in flights])
@@ -195,12 +181,7 @@ class _Fit:
 
     def start(self) -> Vector:
         """Starting point: the sampled model that fits the first flight best."""
-        prior = ParameterDistribution(
-            mean=tuple(self.mean.tolist()),
-            covariance=tuple(tuple(row) for row in np.diag(self.sd**2).tolist()),
-            origin="",
-        )
-        likely = prior.sample(self.experiment, _STARTS)
+        likely = normal_distribution(self.mean, np.diag(self.sd**2), origin="").sample(self.experiment, _STARTS)
         misses = (self._outputs(np.tile(self.gains[0], (_STARTS, 1)), likely) - self.measured[0]) / self.noise[1]
         cost = np.sum(misses**2, axis=1) + np.sum(((likely - self.mean) / self.sd) ** 2, axis=1)
         return np.concatenate((likely[np.argmin(cost)], np.zeros(len(self.gains) * len(self.own))))

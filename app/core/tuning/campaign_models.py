@@ -1,35 +1,38 @@
-"""Registry of the models that are fitted to flights, and what the flights tell of the vehicle."""
+"""The models that are fitted to flights, and what the flights tell of the vehicle."""
 
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 from typing import Final
 
 from app.core.definition import Flight
-from app.core.errors import InputError, TrajectoryError
+from app.core.errors import InputError
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import Experiment, ModelledExperiment, ParameterDistribution, prior_distribution
 from app.core.experiments.copter_steps import CopterSteps
 from app.core.experiments.takeoff import Takeoff
-from app.core.tuning.campaign_model import CampaignModel
-from app.core.tuning.copter_model import fit_copter_steps
-from app.core.tuning.vertical_model import fit_steps, fit_takeoff
+from app.core.tuning.copter_model import CopterModel
+from app.core.tuning.vertical_model import StepsModel, TakeoffModel
 
-Fit = Callable[[ModelledExperiment, Sequence[Flight]], CampaignModel]
+CampaignModel = TakeoffModel | StepsModel | CopterModel
+"""A model of one vehicle, fitted to a campaign's flights, as the strategy `calibrated` takes it."""
 
-FITS: Final[Mapping[type[object], Fit]] = MappingProxyType(
-    {Takeoff: fit_takeoff, AltitudeSteps: fit_steps, CopterSteps: fit_copter_steps}
-)
-"""By the kind of experiment; at least one flight must be valid."""
-
-
-def fit_of(experiment: Experiment) -> Fit | None:
-    """The fit of the experiment's model; None if there is none."""
-    return next((fit for kind, fit in FITS.items() if isinstance(experiment, kind)), None)
+CALIBRATED: Final = (Takeoff, AltitudeSteps)
+"""Experiments the parameters of whose model are found by `app.core.tuning.calibration`."""
+FITTED: Final = (*CALIBRATED, CopterSteps)
+"""Experiments whose model is fitted to flights."""
 
 
-def is_calibrated(experiment: ModelledExperiment) -> bool:
-    """Whether the parameters of its model are found by `app.core.tuning.calibration`."""
-    return fit_of(experiment) in (fit_takeoff, fit_steps)
+def fit(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CampaignModel:
+    """The model of these flights; at least one must be valid.
+
+    Raises TypeError for an experiment whose model is not fitted, and TrajectoryError if a record does not suffice.
+    """
+    if isinstance(experiment, Takeoff):
+        return TakeoffModel(experiment, flights)
+    if isinstance(experiment, AltitudeSteps):
+        return StepsModel(experiment, flights)
+    if isinstance(experiment, CopterSteps):
+        return CopterModel(experiment, flights)
+    raise TypeError(f"calibrated does not work with {experiment.name}")
 
 
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
@@ -38,13 +41,11 @@ def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> Par
     Experiments without a fit, and flights that do not suffice for one, use the data sheet; without a model the
     distribution is empty.
     """
-    modelled = experiment.modelled
-    fit = None if modelled is None else fit_of(modelled)
-    if modelled is None or fit is None or all(flight.error is None for flight in flights):
+    if not isinstance(experiment, FITTED) or all(flight.error is None for flight in flights):
         return prior_distribution(experiment)
     try:
-        return fit(modelled, flights).spread
-    except (InputError, TrajectoryError):
+        return fit(experiment, flights).spread
+    except InputError:
         return prior_distribution(experiment)
 
 

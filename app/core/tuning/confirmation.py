@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight
+from app.core.definition import Definition, Flight, StopRule
 from app.core.experiments.base import Experiment
-from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, times
+from app.core.formatting import confidence_text, count, direction_of, format_gains, percent, plus_minus, short, times
 from app.core.statistics.comparisons import (
     Comparison,
-    FlightsToDecide,
     Group,
     PooledScatter,
     compare,
@@ -46,21 +45,15 @@ class ComparisonState:
     """Comparison of the flights so far; at least one is valid.
 
     `baseline` is the group of the first valid flight, `winner` the best policy; `comparison` of the two is None while
-    they are the same.
+    they are the same. `looks` is the number of comparisons since both were repeated; 0 before.
     """
 
     groups: tuple[Group, ...]
     scatter: PooledScatter
     baseline: Group
     winner: Group
+    looks: int
     comparison: Comparison | None
-
-    @property
-    def looks(self) -> int:
-        """Number of comparisons since both policies were repeated; 0 before."""
-        if min(self.winner.size, self.baseline.size) < 2:
-            return 0
-        return self.winner.size + self.baseline.size - 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,18 +75,20 @@ def compare_winner(definition: Definition, experiment: Experiment, flights: Sequ
         return None
     scatter = pool_scatter(groups, experiment.scatter)
     baseline, winner = groups[0], select_winner(groups, scatter)
-    bare = ComparisonState(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=None)
-    if winner is baseline:
-        return bare
-    comparison = compare(
-        winner,
-        baseline,
-        scatter,
-        definition.stop.confidence,
-        candidates=len(groups) - 1,
-        looks=bare.looks if definition.stop.kind == "noise" else 0,
+    looks = 0 if min(winner.size, baseline.size) < 2 else winner.size + baseline.size - 3
+    comparison = None
+    if winner is not baseline:
+        comparison = compare(
+            winner,
+            baseline,
+            scatter,
+            definition.stop.confidence,
+            candidates=len(groups) - 1,
+            looks=looks if definition.stop.kind == "noise" else 0,
+        )
+    return ComparisonState(
+        groups=groups, scatter=scatter, baseline=baseline, winner=winner, looks=looks, comparison=comparison
     )
-    return ComparisonState(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=comparison)
 
 
 def standing_within_bounds(
@@ -113,7 +108,7 @@ def confirm(
     inside = _inside(definition, experiment, flights)
     now = compare_winner(definition, experiment, inside)
     assert now is not None
-    found = _next(definition, experiment, now, definition.stop.max_flights - len(flights), proposal)
+    found = _Prospect(definition.stop, experiment, now, definition.stop.max_flights - len(flights), proposal).next()
     return replace(found, why=f"{found.why} {_left_out(flights, inside)}".strip())
 
 
@@ -135,68 +130,118 @@ def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:
     return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} not compared."
 
 
-def _next(
-    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
-) -> Confirmation:
-    if now.winner is now.baseline:
-        return _confirm_baseline(definition, experiment, now, left, proposal)
-    if left <= 0:
-        return Confirmation(phase="decided", why=verdict_sentence(experiment, now))
-    if obstacle := _obstacle_to_step(definition, experiment, now, left, proposal):
-        again = _flown_again(experiment, now)
-        return replace(again, why=f"{again.why} {obstacle}")
-    return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
-
-
 def describe_step(
     definition: Definition, experiment: Experiment, flights: Sequence[Flight], now: ComparisonState, proposal: Proposal
 ) -> str:
     """Predicted improvement of a step beside what the remaining flights, at least one, can distinguish from noise;
     empty for a `manual` proposal."""
-    left = definition.stop.max_flights - len(flights)
-    if _is_worth_a_step(definition, now, left, proposal):
-        return _describe_improvement(definition, experiment, now, left, proposal)
-    return f"This step {_lack(definition, experiment, now, left, proposal)}"
+    step = _Prospect(definition.stop, experiment, now, definition.stop.max_flights - len(flights), proposal)
+    return step.described if step.is_worth_a_flight else f"This step {step.lack}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Prospect:
+    """A proposed step, beside what the flights that are `left` can distinguish from noise."""
+
+    stop: StopRule
+    experiment: Experiment
+    now: ComparisonState
+    left: int
+    proposal: Proposal
+
+    @property
+    def _improvement(self) -> float:
+        """Predicted improvement of the step."""
+        error = self.proposal.predicted_error
+        return 0.0 if error is None else self.now.winner.mean - error
+
+    @property
+    def _resolvable(self) -> float:
+        return smallest_difference(self.now.scatter, self.now.winner.size, self.left, self.stop.confidence)
+
+    @property
+    def is_worth_a_flight(self) -> bool:
+        if self.proposal.kind == "manual":
+            return True
+        return self.proposal.kind != "none" and self._improvement >= self._resolvable
+
+    @property
+    def described(self) -> str:
+        """Predicted improvement of a step that is flown, and what the remaining flights can resolve; empty for a
+        `manual` proposal."""
+        if self.proposal.kind == "manual":
+            return ""
+        unit = self.experiment.error_unit
+        return (
+            f"The next step is predicted to reduce the error by {short(self._improvement)} {unit}, more than the "
+            f"{short(self._resolvable)} {unit} that {count(self.left, 'flight')} can resolve at "
+            f"{percent(self.stop.confidence)} confidence."
+        )
+
+    @property
+    def lack(self) -> str:
+        """How little a step that is not worth a flight would gain, as the end of a sentence."""
+        if self._improvement <= 0.0:
+            return "is not predicted to reduce the error."
+        unit = self.experiment.error_unit
+        return (
+            f"would reduce the error by {short(self._improvement)} {unit}, less than the {short(self._resolvable)} "
+            f"{unit} that {count(self.left, 'flight')} can resolve."
+        )
+
+    @property
+    def _why_none(self) -> str:
+        return f"{NO_STEP} {'the strategy proposes none.' if self.proposal.kind == 'none' else f'it {self.lack}'}"
+
+    @property
+    def _obstacle(self) -> str:
+        """Why no step is flown before the winner is compared with the baseline; empty if one is."""
+        if not self.is_worth_a_flight:
+            return self._why_none
+        if self.now.winner.size > 1:
+            return f"{NO_STEP} steps end with the first repeat of the best gains."
+        if self.left <= _CONFIRMATION_FLIGHTS:
+            return f"{NO_STEP} the last {_CONFIRMATION_FLIGHTS} flights are reserved for the best and the first gains."
+        return ""
+
+    def next(self) -> Confirmation:
+        """What to fly next."""
+        now, left = self.now, self.left
+        is_baseline = now.winner is now.baseline
+        if left > 0 and (self.is_worth_a_flight if is_baseline else not self._obstacle):
+            return Confirmation(phase="step", why=self.described)
+        sentence = verdict_sentence(self.experiment, now)
+        if is_baseline:
+            tried = len(now.groups) - 1
+            found = _NONE_BETTER.get(tried, f"None of the other {tried} gain sets flown is better.")
+            return Confirmation(phase="decided", why=f"{sentence} {found} {self._why_none if left > 0 else ''}".strip())
+        if left <= 0:
+            return Confirmation(phase="decided", why=sentence)
+        again = _flown_again(now, sentence)
+        return replace(again, why=f"{again.why} {self._obstacle}")
 
 
 def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
     """The winner compared with the first gains, in a sentence."""
-    if now.comparison is None:
+    comparison, unit = now.comparison, experiment.error_unit
+    if comparison is None:
         return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
-    unit, comparison = experiment.error_unit, now.comparison
     pair = f"{format_gains(now.winner.gains)} against the first flight's {format_gains(now.baseline.gains)}"
+    apart, direction = abs(comparison.difference), direction_of(comparison.difference)
     if comparison.confidence is None or comparison.standard_error is None:
-        amount = f"{short(abs(comparison.difference))} {unit}"
-        return f"Not known yet: {pair}, {amount} {_direction(comparison)}. {SCATTER_NOT_KNOWN}"
-    amount = plus_minus(abs(comparison.difference), comparison.standard_error, unit)
+        return f"Not known yet: {pair}, {short(apart)} {unit} {direction}. {SCATTER_NOT_KNOWN}"
+    found = f"{pair}, {plus_minus(apart, comparison.standard_error, unit)} {direction}"
+    sure = f"{confidence_text(comparison.confidence)} confidence"
     if comparison.verdict == "unresolved":
-        return (
-            f"Unresolved: {pair}, {amount} {_direction(comparison)}, {confidence_text(comparison.confidence)} "
-            f"confidence. {_deciding(comparison)}"
-        )
-    return (
-        f"{comparison.verdict.capitalize()} with {confidence_text(comparison.confidence)} confidence: {pair}, {amount} "
-        f"{_direction(comparison)}."
-    )
+        return f"Unresolved: {found}, {sure}. {_deciding(comparison)}"
+    return f"{comparison.verdict.capitalize()} with {sure}: {found}."
 
 
-def _confirm_baseline(
-    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
-) -> Confirmation:
-    if left > 0 and _is_worth_a_step(definition, now, left, proposal):
-        return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
-    tried = len(now.groups) - 1
-    found = _NONE_BETTER.get(tried, f"None of the other {tried} gain sets flown is better.")
-    obstacle = "" if left <= 0 else _no_prospect(definition, experiment, now, left, proposal)
-    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {obstacle}".strip())
-
-
-def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
+def _flown_again(now: ComparisonState, verdict: str) -> Confirmation:
     comparison = now.comparison
     assert comparison is not None
-    sentence = verdict_sentence(experiment, now)
     if now.looks and comparison.verdict != "unresolved":
-        return Confirmation(phase="decided", why=sentence)
+        return Confirmation(phase="decided", why=verdict)
     if now.winner.size <= now.baseline.size:
         why = f"The best gains are flown again{_only_once(now) or ', to show whether they are better than the first'}."
         return Confirmation(phase="repeat", why=f"{why}{_missing(comparison)}")
@@ -216,73 +261,6 @@ def _only_once(now: ComparisonState) -> str:
     return f", because no gain set has two valid flights{assumed}"
 
 
-def _obstacle_to_step(
-    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
-) -> str:
-    """Why no step is flown before the winner is compared with the baseline; empty if one is."""
-    if not _is_worth_a_step(definition, now, left, proposal):
-        return _no_prospect(definition, experiment, now, left, proposal)
-    if now.winner.size > 1:
-        return f"{NO_STEP} steps end with the first repeat of the best gains."
-    if left <= _CONFIRMATION_FLIGHTS:
-        return f"{NO_STEP} the last {_CONFIRMATION_FLIGHTS} flights are reserved for the best and the first gains."
-    return ""
-
-
-def _no_prospect(
-    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
-) -> str:
-    if proposal.kind == "none":
-        return f"{NO_STEP} the strategy proposes none."
-    return f"{NO_STEP} it {_lack(definition, experiment, now, left, proposal)}"
-
-
-def _lack(definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal) -> str:
-    """How little a step that is not worth a flight would gain, as the end of a sentence."""
-    improvement, unit = _predicted_improvement(now, proposal), experiment.error_unit
-    if improvement <= 0.0:
-        return "is not predicted to reduce the error."
-    return (
-        f"would reduce the error by {short(improvement)} {unit}, less than the "
-        f"{short(_detectable_difference(definition, now, left))} {unit} that {count(left, 'flight')} can resolve."
-    )
-
-
-def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:
-    if proposal.kind == "manual":
-        return True
-    return proposal.kind != "none" and _predicted_improvement(now, proposal) >= _detectable_difference(
-        definition, now, left
-    )
-
-
-def _predicted_improvement(now: ComparisonState, proposal: Proposal) -> float:
-    return 0.0 if proposal.predicted_error is None else now.winner.mean - proposal.predicted_error
-
-
-def _detectable_difference(definition: Definition, now: ComparisonState, left: int) -> float:
-    return smallest_difference(now.scatter, now.winner.size, left, definition.stop.confidence)
-
-
-def _describe_improvement(
-    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
-) -> str:
-    """Predicted improvement of a step that is flown, and what the remaining flights can resolve; empty for a `manual`
-    proposal."""
-    if proposal.kind == "manual":
-        return ""
-    unit = experiment.error_unit
-    return (
-        f"The next step is predicted to reduce the error by {short(_predicted_improvement(now, proposal))} {unit}, "
-        f"more than the {short(_detectable_difference(definition, now, left))} {unit} that {count(left, 'flight')} can "
-        f"resolve at {percent(definition.stop.confidence)} confidence."
-    )
-
-
-def _direction(comparison: Comparison) -> str:
-    return "lower" if comparison.difference < 0.0 else "higher"
-
-
 def _missing(comparison: Comparison) -> str:
     """What a comparison without a result still needs, as a further sentence."""
     if comparison.confidence is None:
@@ -290,15 +268,15 @@ def _missing(comparison: Comparison) -> str:
     return f" Unresolved so far. {_deciding(comparison)}" if comparison.verdict == "unresolved" else ""
 
 
-def _shares(further: FlightsToDecide) -> str:
-    shares = ((further.first, "with the best gains"), (further.second, "with the first gains"))
-    return ", ".join(f"{flights} {whose}" for flights, whose in shares if flights)
-
-
 def _deciding(comparison: Comparison) -> str:
-    if comparison.further is None:
+    return deciding_flights(comparison, "with the best gains", "with the first gains")
+
+
+def deciding_flights(comparison: Comparison, first: str, second: str, joint: str = ", ") -> str:
+    """The further flights that would decide an unresolved comparison, in a sentence; `first` and `second` say of whose
+    gains."""
+    further = comparison.further
+    if further is None:
         return "Even 100 more flights would not resolve it."
-    return (
-        f"If the difference persists, {count(comparison.further.total, 'more flight')} would resolve it: "
-        f"{_shares(comparison.further)}."
-    )
+    shares = joint.join(f"{n} {whose}" for n, whose in ((further.first, first), (further.second, second)) if n)
+    return f"If the difference persists, {count(further.total, 'more flight')} would resolve it: {shares}."

@@ -24,20 +24,19 @@ from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.experiments.base import (
     FittedParameter,
     Matrix,
-    ModelledExperiment,
     ParameterDistribution,
     fitted_parameters,
+    normal_distribution,
 )
 from app.core.experiments.copter_steps import CopterSteps, copter_of, vector_of
 from app.core.experiments.copter_steps_hazards import COPTERS
 from app.core.formatting import count, short
 from app.core.models.copter import Copter
 from app.core.policy import Vector
-from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import fitted_flights
 from app.core.tuning.limited_model import LimitedModel
-from app.core.tuning.predictions import CONFIDENCE, FlightPrediction, interval_reach
-from app.core.tuning.strategy import Interval, band_channels
+from app.core.tuning.predictions import FlightPrediction, interval_reach
+from app.core.tuning.strategy import Interval, positive_interval, with_band
 from app.core.tuning.trust_region import Box
 
 _COMPARED: Final = "For comparison: "
@@ -48,7 +47,7 @@ _MODEL_ERROR: Final = 0.04
 
 
 class CopterModel(LimitedModel[Copter]):
-    """A `CampaignModel`."""
+    """The copters that the flights allow, and what they predict."""
 
     def __init__(self, experiment: CopterSteps, flights: Sequence[Flight]) -> None:
         """`experiment` has the autopilot's parameters of the last flight.
@@ -65,9 +64,7 @@ class CopterModel(LimitedModel[Copter]):
             worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
             raise _unlike(worst, why)
         self._hover: Final = experiment.advise_hover(self._estimate.mean.hover_throttle)
-        first = next(flight for flight in flights if flight.outcome == "valid")
-        self.policy_space = experiment.space
-        self.first_gains = experiment.space.vector(first.gains)
+        self._limit_by(experiment.space, flights)
 
     @cached_property
     def _values(self) -> Matrix:
@@ -89,11 +86,8 @@ class CopterModel(LimitedModel[Copter]):
     def spread(self) -> ParameterDistribution:
         beyond = vector_of(self._estimate.deviation) ** 2 - self._values.var(axis=0)
         covariance = np.cov(self._values.T, bias=True) + np.diag(np.maximum(beyond, 0.0))
-        return ParameterDistribution(
-            mean=tuple(self._values.mean(axis=0).tolist()),
-            covariance=tuple(tuple(row) for row in covariance.tolist()),
-            origin=f"the fit to {count(len(self.numbers), 'flight')}",
-        )
+        origin = f"the fit to {count(len(self.numbers), 'flight')}"
+        return normal_distribution(self._values.mean(axis=0), covariance, origin)
 
     @cached_property
     def vehicles(self) -> Sequence[Copter]:
@@ -118,7 +112,8 @@ class CopterModel(LimitedModel[Copter]):
         return self._likeliest.fly(self.loop(gains))
 
     def optimum(self, box: Box) -> Vector | None:
-        """As in the interface. Raises TrajectoryError if the model does not fly as the best flight did."""
+        """The best gains within the box that the limits allow; None if they allow none there. Raises TrajectoryError if
+        the model does not fly as the best flight did."""
         flown_m, modelled_m = self._log.error_m, self._likeliest.fly(self._log.loop)[0]
         if not is_alike(flown_m, modelled_m):
             raise _unlike(
@@ -147,9 +142,8 @@ class CopterModel(LimitedModel[Copter]):
         mean = predicted.altitudes_m.mean(axis=0)
         for whole, part in ((curve, mean), (low, mean - reach), (high, mean + reach)):
             whole[after] = np.interp(grid_s[after], predicted.time_s, part)
-        lower, upper = band_channels(experiment.output)
         return FlightPrediction(
-            trajectory=Trajectory(grid_s, {experiment.output: curve, lower: low, upper: high}, "model", "simulation"),
+            trajectory=with_band(experiment, curve, low, high),
             error=predicted.prediction.error_m,
             interval=_interval(predicted.prediction),
             models=self._values,
@@ -194,11 +188,7 @@ def _interval(predicted: Prediction) -> Interval:
     """The interval of a flight in other weather, wider by the model's own error."""
     reach = interval_reach() * _MODEL_ERROR * predicted.error_m
     below, above = (np.hypot(end - predicted.error_m, reach) for end in (predicted.low_m, predicted.high_m))
-    return Interval(
-        lower=max(predicted.error_m - float(below), 0.0),
-        upper=predicted.error_m + float(above),
-        confidence=CONFIDENCE,
-    )
+    return positive_interval(predicted.error_m - float(below), predicted.error_m + float(above))
 
 
 def _read(experiment: CopterSteps, flight: Flight) -> LoggedFlight:
@@ -221,9 +211,3 @@ def space_within(space: GainSpace, experiment: CopterSteps, box: Box) -> GainSpa
         for name, ends in space.bounds.items()
     }
     return replace(space, bounds=bounds)
-
-
-def fit_copter_steps(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CopterModel:
-    """The model of these flights; at least one must be valid."""
-    assert isinstance(experiment, CopterSteps)
-    return CopterModel(experiment, flights)

@@ -10,6 +10,7 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, SimplexSearch
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
+from app.core.tuning.strategy import ModelPrediction
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
@@ -48,11 +49,11 @@ class CorrectedModel:
         """Gains (k, g) → predicted errors (k,)."""
         return self.experiment.errors(self.outputs(gains))
 
-    def predict(self, gains: Vector) -> tuple[Trajectory, float]:
-        """Predicted output of one policy and its error."""
+    def predict(self, gains: Vector) -> ModelPrediction:
+        """Predicted output of one policy, shape (g,), and its error."""
         outputs = self.outputs(gains[np.newaxis])
         trajectory = Trajectory(self.experiment.grid_s, {self.experiment.output: outputs[0]}, "model", "simulation")
-        return trajectory, float(self.experiment.errors(outputs)[0])
+        return ModelPrediction(trajectory=trajectory, error=float(self.experiment.errors(outputs)[0]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,11 @@ def correct_by_bias(experiment: ModelledExperiment, flight: Flight) -> Corrected
     then = experiment.under(flight.parameters)
     flown = then.outputs(then.space.vector(flight.gains)[np.newaxis], then.nominal_model)[0]
     return CorrectedModel(experiment, experiment.nominal_model, resample_to_grid(then, flight) - flown)
+
+
+def start_model(experiment: ModelledExperiment, donor: Flight | None) -> CorrectedModel:
+    """The model before the first valid flight: the nominal one, or the one corrected by another vehicle's flight."""
+    return uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
 
 
 def correct_in_loop(experiment: ModelledExperiment, flight: Flight) -> DisturbedModel | None:

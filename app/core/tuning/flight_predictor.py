@@ -2,20 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
-from app.core.definition import Definition, Flight, best_flight
+from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.policy import Gains, PolicySpace
-from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
+from app.core.policy import Gains
+from app.core.statistics.comparisons import groups_of, pool_scatter
 from app.core.tuning.calibration import fitted_flights
-from app.core.tuning.campaign_models import as_flown, fit_of
-from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
-from app.core.tuning.predictions import predict_corrected, repeat_proposal, with_interval
-from app.core.tuning.proposals import has_flown
+from app.core.tuning.campaign_models import FITTED
+from app.core.tuning.corrected_model import start_model
+from app.core.tuning.evidence import Evidence
+from app.core.tuning.predictions import repeat_proposal, with_interval
 from app.core.tuning.strategies import STRATEGIES
-from app.core.tuning.strategy import Explanation, PredictionOf, Proposal
-from app.core.tuning.transfer import transfer
+from app.core.tuning.strategy import Explanation, Predictor, Proposal, proposal_of
+from app.core.tuning.transfer import informed_evidence
 
 _UNEXPLAINED = Explanation(summary="")
 
@@ -24,29 +23,17 @@ _UNEXPLAINED = Explanation(summary="")
 class FlightPredictor:
     """The campaign's model, fitted once and asked for many gain sets.
 
-    `base` is the flight whose bias corrects the model, None for an uncorrected one. Of the other `flights` only gains,
-    errors and predictions are used.
+    `base` is the flight whose bias corrects the model, None for an uncorrected one.
     """
 
-    experiment: ModelledExperiment
-    space: PolicySpace
-    flights: Sequence[Flight]
-    scatter: PooledScatter
-    model: PredictionOf
+    evidence: Evidence[ModelledExperiment]
+    model: Predictor
     base: Flight | None
 
     def predict(self, gains: Gains) -> Proposal:
         """Predict a flight with a complete set of gains: its curve with a band, and its error with an interval."""
-        trajectory, error, interval = self.model(self.space.vector(gains))
-        bare = Proposal(
-            kind="manual",
-            gains=dict(gains),
-            predicted=trajectory,
-            predicted_error=error,
-            explanation=_UNEXPLAINED,
-            interval=interval,
-        )
-        return with_interval(self.experiment, self.space, self.flights, bare, self.scatter, base=self.base)
+        predicted = self.model.predict(self.evidence.space.vector(gains))
+        return with_interval(self.evidence, proposal_of("manual", gains, predicted, _UNEXPLAINED), base=self.base)
 
 
 def flight_predictor(
@@ -59,33 +46,23 @@ def flight_predictor(
     modelled = experiment.modelled
     if modelled is None:
         return None
-    if donor is not None:
-        modelled = transfer(definition, modelled, flights, donor).experiment
-    modelled = as_flown(modelled, flights, donor)
-    strategy, flown = STRATEGIES[definition.strategy], has_flown(flights)
-    model = strategy.predict_flight if flown else partial(_first_flight, donor)
-    return FlightPredictor(
-        experiment=modelled,
-        space=experiment.space.narrowed(definition.bounds),
-        flights=flights,
-        scatter=pool_scatter(groups_of(flights), modelled.scatter),
-        model=model(definition, modelled, flights),
-        base=best_flight(flights) if flown and strategy.corrects_model else None,
-    )
+    evidence, _ = informed_evidence(definition, modelled, flights, donor)
+    is_corrected = bool(evidence.valid) and STRATEGIES[definition.strategy].corrects_model
+    base = evidence.best if is_corrected else None
+    return FlightPredictor(evidence=evidence, model=model_of(evidence, donor), base=base)
 
 
-def _first_flight(
-    donor: Flight | None, _definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]
-) -> PredictionOf:
-    """The model before the first valid flight: the nominal one, or the one corrected by the donor's flight."""
-    model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
-    return partial(predict_corrected, model)
+def model_of(evidence: Evidence[ModelledExperiment], donor: Flight | None) -> Predictor:
+    """The strategy's model; before the first valid flight the nominal one, or the one corrected by the donor's."""
+    if not evidence.valid:
+        return start_model(evidence.experiment, donor)
+    return STRATEGIES[evidence.definition.strategy].model(evidence)
 
 
 def modelled_flights(experiment: Experiment, flights: Sequence[Flight]) -> frozenset[int]:
     """Numbers of the flights whose records `flight_predictor` needs."""
     valid = [flight for flight in flights if flight.outcome == "valid"]
-    used = fitted_flights(flights) if valid and fit_of(experiment) is not None else valid
+    used = fitted_flights(flights) if valid and isinstance(experiment, FITTED) else valid
     return frozenset(flight.number for flight in (*valid[:1], *used))
 
 

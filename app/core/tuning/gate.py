@@ -14,6 +14,7 @@ from app.core.formatting import percent
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.tuning.campaign_models import as_flown, known_distribution
 from app.core.tuning.corrected_model import start_gains
+from app.core.tuning.evidence import Evidence
 
 
 def envelope_of(definition: Definition, experiment: Experiment) -> Envelope:
@@ -33,9 +34,7 @@ NUMBERS: Final = "numbers"
 def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
     """Return a refusal for each gain that is not finite, or not a 32-bit integer where the controller needs one."""
     return tuple(
-        Check(
-            NUMBERS, False, f"{gain.name} {reason}.", worst=_outside(gain, gains[gain.name]), limit=0.0, gain=gain.name
-        )
+        _refusal(NUMBERS, gain, gains, reason)
         for gain in space.gains
         if (reason := gain.refusal_by_controller(gains[gain.name])) is not None
     )
@@ -44,19 +43,16 @@ def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
 def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
     """Return a refusal for each gain outside its bounds, or one passed check."""
     refused = tuple(
-        Check(
-            "bounds",
-            False,
-            f"{gain.name} {reason}.",
-            worst=_outside(gain, gains[gain.name]),
-            limit=0.0,
-            gain=gain.name,
-            offer={gain.name: min(max(gains[gain.name], gain.lower), gain.upper)},
-        )
+        _refusal("bounds", gain, gains, reason, {gain.name: min(max(gains[gain.name], gain.lower), gain.upper)})
         for gain in space.gains
         if (reason := gain.refusal_by_bounds(gains[gain.name])) is not None
     )
     return refused or (Check("bounds", True, "Every gain lies within its bounds.", worst=0.0, limit=0.0),)
+
+
+def _refusal(check: str, gain: Gain, gains: Gains, reason: str, offer: dict[str, float] | None = None) -> Check:
+    worst = _outside(gain, gains[gain.name])
+    return Check(check, False, f"{gain.name} {reason}.", worst=worst, limit=0.0, gain=gain.name, offer=offer or {})
 
 
 def check_step(space: PolicySpace, asked: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
@@ -150,26 +146,22 @@ def check_policy(
     """
     if numbers := check_numbers(space, gains):
         return GateResult(numbers)
-    known = known_distribution(experiment, flights) if spread is None else spread
-    hazards = _hazards(definition, experiment, space, gains, flights, known)
-    if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
+    valid, modelled = [flight for flight in flights if flight.outcome == "valid"], experiment.modelled
+    hazards: tuple[Check, ...] = ()
+    if modelled is not None:
+        known = known_distribution(experiment, flights) if spread is None else spread
+        envelope = envelope_of(definition, experiment)
+        hazards = as_flown(modelled, flights).hazards(space.vector(gains), known, envelope)
+    if was_flown(gains, valid):
         hazards = tuple(_flown_before(check) for check in hazards)
-    limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
-    return GateResult(jointly_offered(gains, (*limits, *hazards)))
-
-
-def _hazards(
-    definition: Definition,
-    experiment: Experiment,
-    space: PolicySpace,
-    gains: Gains,
-    flights: Sequence[Flight],
-    spread: ParameterDistribution,
-) -> tuple[Check, ...]:
-    modelled = experiment.modelled
-    if modelled is None:
-        return ()
-    return as_flown(modelled, flights).hazards(space.vector(gains), spread, envelope_of(definition, experiment))
+    if valid:
+        flown = [flight.gains for flight in valid]
+        step = check_step(space, gains, flown, definition.step_fraction, "the nearest flown set")
+    else:
+        origin = start_gains(definition, experiment, space) if start is None else start
+        before = "the start gains before the first valid flight"
+        step = check_step(space, gains, [origin], definition.first_step_fraction, before)
+    return GateResult(jointly_offered(gains, (*check_bounds(space, gains), step, *hazards)))
 
 
 def _flown_before(check: Check) -> Check:
@@ -178,22 +170,6 @@ def _flown_before(check: Check) -> Check:
         return check
     sentence = f"{check.sentence} But a flight of this campaign completed with these gains, so they are allowed again."
     return replace(check, passed=True, sentence=sentence)
-
-
-def _step(
-    definition: Definition,
-    experiment: Experiment,
-    space: PolicySpace,
-    gains: Gains,
-    flights: Sequence[Flight],
-    start: Gains | None,
-) -> Check:
-    flown = [flight.gains for flight in flights if flight.outcome == "valid"]
-    if flown:
-        return check_step(space, gains, flown, definition.step_fraction, "the nearest flown set")
-    origin = start_gains(definition, experiment, space) if start is None else start
-    fraction = definition.first_step_fraction
-    return check_step(space, gains, [origin], fraction, "the start gains before the first valid flight")
 
 
 def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = False) -> str:
@@ -239,8 +215,7 @@ def _hint(gate: GateResult, is_real: bool) -> str:
     return f"{nearest}{choose}{may_overrule}"
 
 
-def allows(
-    definition: Definition, experiment: ModelledExperiment, gains: Vector, spread: ParameterDistribution
-) -> bool:
+def allows(evidence: Evidence[ModelledExperiment], gains: Vector, spread: ParameterDistribution) -> bool:
     """Whether gains of shape (n,) pass the experiment's hazard checks over the vehicle's parameter distribution."""
-    return all(check.passed for check in experiment.hazards(gains, spread, envelope_of(definition, experiment)))
+    envelope = envelope_of(evidence.definition, evidence.experiment)
+    return all(check.passed for check in evidence.experiment.hazards(gains, spread, envelope))

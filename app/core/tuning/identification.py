@@ -142,9 +142,7 @@ def _rms(values: Cube) -> Vector:
 def _fit(experiment: PitchTracking, windows: Cube, residuals: Residuals) -> tuple[Vector, Matrix]:
     """Gauss–Newton from the model's own parameters; the noise follows the residuals down to the storage precision."""
     nominal = experiment.nominal_model
-    precision = 1.0 / np.array([parameter.prior_sd for parameter in experiment.model_parameters]) ** 2
-    lower = np.array([parameter.lower for parameter in experiment.model_parameters])
-    upper = np.array([parameter.upper for parameter in experiment.model_parameters])
+    precision = 1.0 / experiment.prior_sd**2
     floor = _SINGLE_PRECISION * np.abs(windows[..., :STATES]).max(axis=(0, 1)) + _SMALLEST
     model = nominal
     noise = np.maximum(_rms(residuals(experiment, model[np.newaxis], windows, floor)[0]), floor)
@@ -158,7 +156,7 @@ def _fit(experiment: PitchTracking, windows: Cube, residuals: Residuals) -> tupl
         covariance = np.linalg.inv(np.einsum("ik,jk->ij", slopes, slopes) + np.diag(precision))
         step = -covariance @ (slopes @ now + precision * (model - nominal))
         step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max()))
-        model = np.clip(model + step, lower, upper)
+        model = np.clip(model + step, *experiment.limits)
         before = noise
         noise = np.maximum(_rms(residuals(experiment, model[np.newaxis], windows, noise)[0]), floor)
         moved = np.abs(step) / np.sqrt(np.diag(covariance))

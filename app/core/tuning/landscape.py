@@ -5,12 +5,12 @@ A slice through a gain set g₀ varies the gains i and j and holds the others:
     E_ij(x, y) = E(g₀ with gᵢ = x, gⱼ = y),
 
 where E is the error predicted by the strategy's own model, corrected or calibrated as for the proposal
-(`Strategy.predict_errors`; before the first valid flight, the nominal model or the one corrected by the donor's
+(`Strategy.model`; before the first valid flight, the nominal model or the one corrected by the donor's
 flight). With more than three gains, those with the largest share of the gradient, |∂E/∂gᵢ|·scaleᵢ, are varied: the
 change of the error over one scale of the gain.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from math import isfinite
@@ -19,13 +19,13 @@ from typing import Final
 import numpy as np
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
+from app.core.experiments.base import Experiment, Matrix
 from app.core.policy import Gain, Gains, PolicySpace, Vector
-from app.core.tuning.campaign_models import as_flown
-from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
-from app.core.tuning.strategies import STRATEGIES
-from app.core.tuning.strategy import ErrorsOf
-from app.core.tuning.transfer import transfer
+from app.core.tuning.flight_predictor import model_of
+from app.core.tuning.transfer import informed_evidence
+
+ErrorsOf = Callable[[Matrix], Vector]
+"""Gains (k, g) → the errors a model predicts for them, (k,)."""
 
 POINTS: Final = 17
 """Largest number of values of a gain in a slice; integer gains may have fewer."""
@@ -124,10 +124,11 @@ def plan_grid(plan: LandscapePlan, experiment: Experiment) -> LandscapeGrid | No
 
     Pure; a calibration takes up to a second.
     """
-    space = experiment.space.narrowed(plan.definition.bounds)
-    predict_errors = _error_model(plan.definition, experiment.modelled, plan.flights, plan.donor)
-    if predict_errors is None or free_gains(space) < 2:
+    space, modelled = experiment.space.narrowed(plan.definition.bounds), experiment.modelled
+    if modelled is None or free_gains(space) < 2:
         return None
+    evidence, _ = informed_evidence(plan.definition, modelled, plan.flights, plan.donor)
+    predict_errors = model_of(evidence, plan.donor).errors
     centre = space.nearest(space.vector(plan.centre))
     marks = np.array([space.vector(gains) for gains in (*plan.marks, space.mapping(centre))])
     return LandscapeGrid(
@@ -149,38 +150,14 @@ def free_gains(space: PolicySpace) -> int:
     return sum(gain.span > 0.0 for gain in space.gains)
 
 
-def _error_model(
-    definition: Definition, experiment: ModelledExperiment | None, flights: Sequence[Flight], donor: Flight | None
-) -> ErrorsOf | None:
-    """The model that `next_proposal` uses for the same history; None if there is none."""
-    if experiment is None:
-        return None
-    if donor is not None:
-        experiment = transfer(definition, experiment, flights, donor).experiment
-    experiment = as_flown(experiment, flights, donor)
-    if all(flight.outcome != "valid" for flight in flights):
-        return (uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)).errors
-    return STRATEGIES[definition.strategy].predict_errors(definition, experiment, flights)
-
-
 def _pairs(space: PolicySpace, centre: Vector, predict_errors: ErrorsOf) -> list[tuple[int, int]]:
     """Pairs of free gains, those with the largest shares of the gradient first; each pair in the order of the gains."""
     free = [place for place, gain in enumerate(space.gains) if gain.span > 0.0]
     pairs = list(combinations(free, 2))
     if len(pairs) <= MAX_SLICES:
         return pairs
-    shares = _shares(space, centre, predict_errors)
+    shares = np.abs(space.slopes(predict_errors, centre, _DIFFERENCE * space.scale)) * space.scale
     return sorted(pairs, key=lambda pair: -(shares[pair[0]] + shares[pair[1]]))[:MAX_SLICES]
-
-
-def _shares(space: PolicySpace, centre: Vector, predict_errors: ErrorsOf) -> Vector:
-    """|∂E/∂gᵢ|·scaleᵢ at `centre` by central differences, shape (n,); zero for a pinned gain."""
-    steps = np.diag(_DIFFERENCE * space.scale)
-    above, below = np.minimum(centre + steps, space.upper), np.maximum(centre - steps, space.lower)
-    errors = predict_errors(np.concatenate((above, below)))
-    run = np.diag(above - below)
-    rise = np.abs(errors[: len(centre)] - errors[len(centre) :])
-    return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run > 0.0) * space.scale)
 
 
 def _values(gain: Gain, marks: Vector) -> Vector:

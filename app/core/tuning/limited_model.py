@@ -28,12 +28,18 @@ _V = TypeVar("_V")
 
 
 class LimitedModel(ABC, Generic[_V]):
-    """A part of a `CampaignModel`; gains have shape (n,), `first_gains` are those of the first flight."""
+    """A part of a `CampaignModel`; gains have shape (n,). `base` is the best flight, `first_gains` are those of the
+    first one."""
 
     least_improvement: Final = 0.05
     base: Flight
     first_gains: Vector
     policy_space: PolicySpace
+
+    def _limit_by(self, space: PolicySpace, flights: Sequence[Flight]) -> None:
+        """The gains, and the first of the flights that are valid."""
+        first = next(flight for flight in flights if flight.outcome == "valid")
+        self.policy_space, self.first_gains = space, space.vector(first.gains)
 
     @property
     @abstractmethod

@@ -23,18 +23,27 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Flight, Prediction
-from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, ParameterDistribution
+from app.core.definition import Flight
+from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, normal_distribution
 from app.core.formatting import count
 from app.core.models.vertical import ENTERED
-from app.core.policy import PolicySpace, Vector
+from app.core.policy import Vector
 from app.core.records.trajectory import Samples, Trajectory
-from app.core.statistics.comparisons import Group, PooledScatter, groups_of
+from app.core.statistics.comparisons import Group, PooledScatter
 from app.core.tuning.calibration import Calibration
-from app.core.tuning.corrected_model import CorrectedModel, resample_to_grid
-from app.core.tuning.strategy import Explanation, Interval, Kind, ModelPrediction, Proposal, band_channels
+from app.core.tuning.corrected_model import resample_to_grid
+from app.core.tuning.evidence import Evidence
+from app.core.tuning.strategy import (
+    CONFIDENCE,
+    Explanation,
+    Interval,
+    Kind,
+    ModelPrediction,
+    Proposal,
+    positive_interval,
+    with_band,
+)
 
-CONFIDENCE: Final = 0.9
 MODELS: Final = 16
 _PRIOR_WEIGHT: Final = 4.0
 _DISAGREEMENTS: Final = 3
@@ -53,13 +62,38 @@ class TrackRecord:
     of: int
     agreeing: int
     disagreeing: int
-    trustworthy: bool
-    sentence: str
+
+    @property
+    def trustworthy(self) -> bool:
+        """False once at least three flights went in the other direction, and more than went in the predicted one."""
+        return not (self.disagreeing >= _DISAGREEMENTS and self.disagreeing > self.agreeing)
 
     @property
     def share(self) -> float | None:
         """Share of flights inside their interval; None before the first flight with an interval."""
         return self.inside / self.of if self.of else None
+
+    @property
+    def sentence(self) -> str:
+        moved = self.agreeing + self.disagreeing
+        if not self.of and not moved:
+            return "No prediction has been tested by a flight yet."
+        parts = []
+        if self.of == 1:
+            parts.append(f"the only predicted flight ended {'inside' if self.inside else 'outside'} its interval")
+        elif self.of:
+            parts.append(f"{self.inside} of {self.of} flights ended inside their predicted interval")
+        if moved:
+            changed = f"{count(moved, 'flight')} with new gains changed the error in the predicted direction"
+            parts.append(f"{self.agreeing} of {changed} (repeats are not counted)")
+        ending = (
+            ""
+            if self.trustworthy
+            else "; the gradient is not trustworthy: most flights changed the error in the direction opposite to the "
+            "prediction"
+        )
+        counted = "; ".join(parts)
+        return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 
 def is_informative(lower: float | None, *, corrected: bool) -> bool:
@@ -75,8 +109,7 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
     """Compute the track record of the predictions that the flights carry.
 
     The direction counts where new gains were predicted to change the best error before them; repeated gains predict no
-    change. A prediction that is not informative is not counted. The predictions are not trustworthy once at least
-    three flights went in the other direction, and more than went in the predicted one.
+    change. A prediction that is not informative is not counted.
     """
     inside = of = agreeing = disagreeing = 0
     best: float | None = None
@@ -99,66 +132,33 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
             disagreeing += agreed < 0.0
         best = flight.error if best is None else min(best, flight.error)
         seen.add(gains)
-    trustworthy = not (disagreeing >= _DISAGREEMENTS and disagreeing > agreeing)
-    return TrackRecord(
-        inside=inside,
-        of=of,
-        agreeing=agreeing,
-        disagreeing=disagreeing,
-        trustworthy=trustworthy,
-        sentence=_sentence(inside, of, agreeing, disagreeing, trustworthy),
-    )
+    return TrackRecord(inside=inside, of=of, agreeing=agreeing, disagreeing=disagreeing)
 
 
-def prediction_of(proposal: Proposal) -> Prediction | None:
-    """The prediction stored with a flight of the proposal, for later comparison."""
-    if proposal.predicted_error is None:
-        return None
-    interval = proposal.interval
-    return Prediction(
-        error=proposal.predicted_error,
-        lower=None if interval is None else interval.lower,
-        upper=None if interval is None else interval.upper,
-    )
-
-
-def predict_corrected(model: CorrectedModel, gains: Vector) -> ModelPrediction:
-    """What a corrected model predicts for `gains`, shape (n,)."""
-    return ModelPrediction(*model.predict(gains))
-
-
-def with_interval(
-    experiment: ModelledExperiment,
-    space: PolicySpace,
-    flights: Sequence[Flight],
-    proposal: Proposal,
-    scatter: PooledScatter,
-    *,
-    base: Flight | None,
-) -> Proposal:
+def with_interval(evidence: Evidence[ModelledExperiment], proposal: Proposal, *, base: Flight | None) -> Proposal:
     """Add the interval and band to a proposal; one that has an interval, or predicts nothing, is returned unmodified.
 
-    `base` is the flight whose bias corrects the prediction, None for the uncorrected model.
+    `base` is the flight whose bias corrects the prediction, None for the uncorrected model. Of the other flights only
+    gains, errors and predictions are used.
     """
     from scipy.special import stdtrit
 
     if proposal.interval is not None or proposal.predicted is None or proposal.predicted_error is None:
         return proposal
-    outputs = _sample_outputs(experiment, space, space.vector(proposal.gains), base)
-    repeats = next((group.size for group in groups_of(flights) if base and base.number in group.numbers), 0)
+    experiment, scatter = evidence.experiment, evidence.scatter
+    outputs = _sample_outputs(experiment, evidence.space.vector(proposal.gains), base)
+    repeats = next((group.size for group in evidence.groups if base and base.number in group.numbers), 0)
     noise = scatter.sigma**2 * (1.0 + (1.0 / repeats if repeats else 0.0))
-    reach = float(stdtrit(scatter.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * interval_scale(flights)
+    reach = float(stdtrit(scatter.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * interval_scale(evidence.flights)
     errors, curve = experiment.errors(outputs), proposal.predicted[experiment.output]
     half = reach * float(np.sqrt(noise + np.var(errors, ddof=1)))
     offset = noise / offset_sensitivity(experiment) ** 2
     band = reach * np.sqrt(offset + np.var(outputs, axis=0, ddof=1))
-    middle = np.mean(outputs, axis=0)
-    edges = (np.minimum(curve, middle - band), np.maximum(curve, middle + band))
-    centre = float(np.mean(errors))
+    middle, centre, error = np.mean(outputs, axis=0), float(np.mean(errors)), proposal.predicted_error
     return replace(
         proposal,
-        interval=_interval(min(proposal.predicted_error, centre - half), max(proposal.predicted_error, centre + half)),
-        predicted=_with_band(proposal.predicted, experiment.output, *edges),
+        interval=positive_interval(min(error, centre - half), max(error, centre + half)),
+        predicted=with_band(experiment, curve, np.minimum(curve, middle - band), np.maximum(curve, middle + band)),
     )
 
 
@@ -176,18 +176,22 @@ def repeat_proposal(
     contradict the prior.
     """
     measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
-    curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
-    bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
+    curve = measured.mean(axis=0)
+    bare = Proposal(
+        kind=kind,
+        gains=dict(group.gains),
+        predicted=Trajectory(experiment.grid_s, {experiment.output: curve}, "flights", "simulation"),
+        predicted_error=group.mean,
+        explanation=why,
+    )
     if scatter.reported is None:
         return bare
     half = scatter.half_width(1.0 + 1.0 / group.size, CONFIDENCE)
     offset = half / offset_sensitivity(experiment)
     return replace(
         bare,
-        predicted=_with_band(
-            curve, experiment.output, curve[experiment.output] - offset, curve[experiment.output] + offset
-        ),
-        interval=_interval(group.mean - half, group.mean + half),
+        predicted=with_band(experiment, curve, curve - offset, curve + offset, source="flights"),
+        interval=positive_interval(group.mean - half, group.mean + half),
     )
 
 
@@ -217,59 +221,25 @@ def interval_scale(flights: Sequence[Flight]) -> float:
     return float(np.sqrt((_PRIOR_WEIGHT + sum(squares)) / (_PRIOR_WEIGHT + len(squares))))
 
 
-def _with_band(curve: Trajectory, output: str, lower: Samples, upper: Samples) -> Trajectory:
-    """A predicted curve with the two edges of its band added as channels."""
-    edges = dict(zip(band_channels(output), (lower, upper), strict=True))
-    return replace(curve, channels={**curve.channels, **edges})
-
-
-def _interval(lower: float, upper: float) -> Interval:
-    """The interval, cut off at zero: an error is never negative."""
-    return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
-
-
-def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
+def _sample_outputs(experiment: ModelledExperiment, gains: Vector, base: Flight | None) -> Matrix:
     """Outputs of these gains on the sampled models, shape (k, n), each with its own bias if there is a base."""
     parameters = experiment.model_parameters
-    prior = ParameterDistribution(
-        mean=tuple(parameter.prior_mean for parameter in parameters),
-        covariance=tuple(map(tuple, np.diag([parameter.prior_sd**2 for parameter in parameters]).tolist())),
+    prior = normal_distribution(
+        np.array([parameter.prior_mean for parameter in parameters]),
+        np.diag([parameter.prior_sd**2 for parameter in parameters]),
         origin="the priors of a fit",
     )
     models = prior.sample(experiment, MODELS)
     proposed = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
     if base is None:
         return proposed
-    flown = experiment.outputs(np.tile(space.vector(base.gains), (MODELS, 1)), models)
+    flown = experiment.outputs(np.tile(experiment.space.vector(base.gains), (MODELS, 1)), models)
     return np.asarray(proposed - flown + resample_to_grid(experiment, base))
 
 
 def offset_sensitivity(experiment: Experiment) -> float:
     """Error caused by a constant offset of one unit of the output: 1 for a mean, the window for an integral."""
     return experiment.window_s if experiment.integrates else 1.0
-
-
-def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:
-    if not of and not agreeing + disagreeing:
-        return "No prediction has been tested by a flight yet."
-    parts = []
-    if of == 1:
-        parts.append(f"the only predicted flight ended {'inside' if inside else 'outside'} its interval")
-    elif of:
-        parts.append(f"{inside} of {of} flights ended inside their predicted interval")
-    if agreeing + disagreeing:
-        changed = (
-            f"{count(agreeing + disagreeing, 'flight')} with new gains changed the error in the predicted direction"
-        )
-        parts.append(f"{agreeing} of {changed} (repeats are not counted)")
-    ending = (
-        ""
-        if trustworthy
-        else "; the gradient is not trustworthy: most flights changed the error in the direction opposite to the "
-        "prediction"
-    )
-    counted = "; ".join(parts)
-    return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 
 _AT_ONCE: Final = 8
@@ -280,15 +250,11 @@ _GUST_VARIATION: Final = 0.5
 """Relative variation of the error caused by gusts between flights."""
 
 
-@dataclass(frozen=True, slots=True)
-class FlightPrediction:
-    """Prediction of a flight: its curve with a band, and its error with an interval.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPrediction(ModelPrediction):
+    """Prediction of a flight by a fitted model, its curve with a band; `models` are those used, (k, m), with their
+    `errors` (k,)."""
 
-    `models` are the models used, (k, m), with their `errors` (k,).
-    """
-
-    trajectory: Trajectory
-    error: float
     interval: Interval
     models: Matrix
     errors: Vector
@@ -310,12 +276,10 @@ def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> Fli
     noise = float(np.sqrt(np.mean(bias**2)))
     reach = interval_reach()
     half = reach * np.sqrt(outputs.var(axis=0) + noise**2)
-    lower, upper = band_channels(experiment.output)
-    channels = {experiment.output: curve, lower: curve - half, upper: curve + half}
     return FlightPrediction(
-        trajectory=Trajectory(experiment.grid_s, channels, "model", "simulation"),
+        trajectory=with_band(experiment, curve, curve - half, curve + half),
         error=error,
-        interval=Interval(lower=max(error - reach * sd, 0.0), upper=error + reach * sd, confidence=CONFIDENCE),
+        interval=positive_interval(error - reach * sd, error + reach * sd),
         models=models,
         errors=errors,
     )

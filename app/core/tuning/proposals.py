@@ -9,25 +9,25 @@ from typing import Final, Literal
 from app.core.definition import Definition, Flight, LogEvidence, aborted_by_gains
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, short
-from app.core.policy import Gains, PolicySpace
-from app.core.statistics.comparisons import Group, groups_of, pool_scatter
-from app.core.tuning.campaign_models import as_flown, changed_parameters, known_distribution
+from app.core.policy import Gains
+from app.core.statistics.comparisons import Group
+from app.core.tuning.campaign_models import changed_parameters, known_distribution
 from app.core.tuning.confirmation import (
     NO_STEP,
-    Confirmation,
     compare_winner,
     confirm,
     describe_step,
     standing_within_bounds,
 )
-from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
+from app.core.tuning.corrected_model import start_gains, start_model
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import GateResult, check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
 from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import propose as by_hand
-from app.core.tuning.strategy import Explanation, Kind, Proposal
-from app.core.tuning.transfer import Transfer, transfer
+from app.core.tuning.strategy import Explanation, Kind, Proposal, proposal_of
+from app.core.tuning.transfer import informed_evidence
 
 _ORIGIN = {
     "default": "the vehicle's default gains",
@@ -52,74 +52,49 @@ def next_proposal(
     stop rule `noise` the proposal may repeat the winner or the first gains, or be of kind `none` once no further step
     can be distinguished from noise.
     """
-    space, modelled = experiment.space.narrowed(definition.bounds), experiment.modelled
+    modelled = experiment.modelled
     if modelled is None:
-        return _manual_proposal(definition, experiment, space, flights)
-    warm = None if donor is None else transfer(definition, modelled, flights, donor)
-    if warm is not None:
-        modelled, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
-    modelled = as_flown(modelled, flights, donor)
-    if not has_flown(flights):
-        return _start(definition, modelled, space, flights, donor)
-    scatter = pool_scatter(groups_of(flights), modelled.scatter)
+        return _manual_proposal(Evidence(definition=definition, experiment=experiment, flights=flights))
+    evidence, taken = informed_evidence(definition, modelled, flights, donor)
+    if not evidence.valid:
+        return _start(evidence, donor)
     strategy = STRATEGIES[definition.strategy]
-    proposal = strategy.propose(definition, modelled, space, flights)
+    proposal = strategy.propose(evidence)
     number = proposal.explanation.base_flight if strategy.corrects_model else None
     base = next((flight for flight in flights if flight.number == number), None)
-    proposal = with_interval(modelled, space, flights, proposal, scatter, base=base)
-    return _with_notes(_confirmed(definition, modelled, space, flights, proposal), modelled, flights, warm)
+    return _with_notes(_confirmed(evidence, with_interval(evidence, proposal, base=base)), evidence, taken)
 
 
-def has_flown(flights: Sequence[Flight]) -> bool:
-    """Whether any flight is valid."""
-    return any(flight.outcome == "valid" for flight in flights)
-
-
-def _manual_proposal(
-    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]
-) -> Proposal:
+def _manual_proposal(evidence: Evidence[Experiment]) -> Proposal:
     """Without a model: propose the start gains, then the operator's own; nothing is predicted."""
-    if has_flown(flights):
-        proposal = by_hand(definition, experiment, space, flights)
-        return _confirmed(definition, experiment, space, flights, proposal)
-    gains = start_gains(definition, experiment, space)
-    origin = _describe_start(definition, gains, flights)
-    summary = f"{origin}; there is no model of this vehicle's controller, so there is no prediction."
+    if evidence.valid:
+        return _confirmed(evidence, by_hand(evidence))
+    gains = start_gains(evidence.definition, evidence.experiment, evidence.space)
+    summary = (
+        f"{_describe_start(evidence, gains)}; there is no model of this vehicle's controller, so there is no "
+        "prediction."
+    )
     lesson = "The result of these gains, as a reference for the others."
-    explanation = Explanation(summary=summary, lesson=lesson)
-    return Proposal(kind="start", gains=gains, predicted=None, predicted_error=None, explanation=explanation)
+    return proposal_of("start", gains, None, Explanation(summary=summary, lesson=lesson))
 
 
-def _start(
-    definition: Definition,
-    experiment: ModelledExperiment,
-    space: PolicySpace,
-    flights: Sequence[Flight],
-    donor: Flight | None,
-) -> Proposal:
-    gains = start_gains(definition, experiment, space)
-    model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
-    trajectory, error = model.predict(space.vector(gains))
-    log = definition.start.log
+def _start(evidence: Evidence[ModelledExperiment], donor: Flight | None) -> Proposal:
+    experiment, log = evidence.experiment, evidence.definition.start.log
+    gains = start_gains(evidence.definition, experiment, evidence.space)
+    predicted = start_model(experiment, donor).predict(evidence.space.vector(gains))
     uncorrected = "the nominal model" if log is None else "the model of the vehicle in that log"
     source = f"{uncorrected}, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     lesson = (
         "How much this vehicle deviates from the model." if donor is None else "Whether the two vehicles are similar."
     )
-    start = Proposal(
-        kind="start",
-        gains=gains,
-        predicted=trajectory,
-        predicted_error=error,
-        explanation=Explanation(summary="", lesson=lesson),
-    )
-    start = with_interval(experiment, space, flights, start, pool_scatter((), experiment.scatter), base=None)
+    start = proposal_of("start", gains, predicted, Explanation(summary="", lesson=lesson))
+    start = with_interval(evidence, start, base=None)
     outlook = (
-        f"predicts {short(error)} {experiment.error_unit}"
+        f"predicts {short(predicted.error)} {experiment.error_unit}"
         if is_informative(None if start.interval is None else start.interval.lower, corrected=False)
         else "is too uncertain to predict its error"
     )
-    summary = f"{_describe_start(definition, gains, flights)}; {source} {outlook}."
+    summary = f"{_describe_start(evidence, gains)}; {source} {outlook}."
     notes = () if log is None else (_describe_log(log),)
     return replace(start, explanation=replace(start.explanation, summary=summary, notes=notes))
 
@@ -132,9 +107,9 @@ def _describe_log(log: LogEvidence) -> str:
     )
 
 
-def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flight]) -> str:
+def _describe_start(evidence: Evidence[Experiment], gains: Gains) -> str:
     """Source of the start gains, without a full stop; first the flights with these gains that were aborted."""
-    log = definition.start.log
+    definition, flights, log = evidence.definition, evidence.flights, evidence.definition.start.log
     origin = _ORIGIN[definition.start.kind] if log is None else f"the gains proposed from {log.file_name}"
     source = f"{origin} ({format_gains(gains)})"
     numbers = [flight.number for flight in aborted_by_gains(flights, gains)]
@@ -147,14 +122,13 @@ def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flig
     return f"The {'next' if flights else 'first'} flight uses {source}"
 
 
-def _confirmed(
-    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], proposal: Proposal
-) -> Proposal:
+def _confirmed(evidence: Evidence[Experiment], proposal: Proposal) -> Proposal:
     """Apply the stop rule `noise` to the strategy's proposal.
 
     The proposal is kept if a step is still worth a flight. Otherwise it is replaced by the flight that the confirmation
     requires, or by kind `none` if the gate refuses that flight.
     """
+    definition, experiment, flights = evidence.definition, evidence.experiment, evidence.flights
     now = standing_within_bounds(definition, experiment, flights) if definition.stop.kind == "noise" else None
     if now is None:
         return proposal
@@ -171,7 +145,7 @@ def _confirmed(
     if wanted.phase == "decided":
         return again(now.winner, "none", Explanation(summary=wanted.why))
     group = now.winner if wanted.phase == "repeat" else now.baseline
-    gate = check_policy(definition, experiment, space, group.gains, flights, spread=spread)
+    gate = check_policy(definition, experiment, evidence.space, group.gains, flights, spread=spread)
     if not gate.passed:
         return again(now.winner, "none", Explanation(summary=_refused(group, gate)))
     lesson = "Whether the best gains are better than the first."
@@ -186,16 +160,15 @@ def _refused(group: Group, gate: GateResult) -> str:
     )
 
 
-def _with_notes(
-    proposal: Proposal, experiment: ModelledExperiment, flights: Sequence[Flight], warm: Transfer | None
-) -> Proposal:
-    record = track_record(flights)
-    notes = (
-        *proposal.explanation.notes,
-        *((warm.sentence,) if warm is not None and warm.sentence else ()),
-        *filter(None, (changed_parameters(experiment, flights),)),
-        *((record.sentence,) if record.of or record.agreeing or record.disagreeing else ()),
+def _with_notes(proposal: Proposal, evidence: Evidence[ModelledExperiment], taken: str) -> Proposal:
+    """The proposal with notes on what was `taken` from another vehicle, changed parameters, and the track record."""
+    record = track_record(evidence.flights)
+    further = (
+        taken,
+        changed_parameters(evidence.experiment, evidence.flights),
+        record.sentence if record.of or record.agreeing or record.disagreeing else "",
     )
+    notes = (*proposal.explanation.notes, *filter(None, further))
     return replace(proposal, explanation=replace(proposal.explanation, notes=notes))
 
 
@@ -249,10 +222,6 @@ def advise(
         effect = "" if now is None or tells_noise else describe_step(definition, experiment, flights, now, proposal)
         return Advice(kind=kind, gains=proposal.gains, why=effect or proposal.explanation.summary)
     confirmation = confirm(definition, experiment, flights, proposal)
-    kind = _kind(confirmation)
+    kind = "stop" if confirmation.phase == "decided" else confirmation.phase
     chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}
     return Advice(kind=kind, gains=dict(chosen.get(kind, now.winner.gains)), why=confirmation.why)
-
-
-def _kind(confirmation: Confirmation) -> AdviceKind:
-    return "stop" if confirmation.phase == "decided" else confirmation.phase

@@ -129,56 +129,49 @@ def decide_stop(
         improves = best is None or error < (1.0 - rule.improvement) * best
         failures = 0 if improves else failures + 1
         best = error if best is None else min(error, best)
-    threshold = None if best is None or rule.kind == "noise" else (1.0 - rule.improvement) * best
-    reason = _reason(rule, len(errors), failures, proposal_kind, battery_v)
+    ended = _ended(rule, len(errors), failures, proposal_kind, battery_v, open_until_flight)
+    reason, sentence = ended or (None, "")
+    if reason is not None:
+        why = f"{sentence} {because if rule.kind == 'noise' else ''}".strip()
+    elif rule.kind == "paper" and failures:
+        why = (
+            f"The last flight did not improve on the best before it by more than {percent(rule.improvement)}; one more "
+            "such flight ends the campaign."
+        )
+    else:
+        left = rule.max_flights - len(errors)
+        why = f"{left} of {rule.max_flights} flights {'is' if left == 1 else 'are'} left."
     return StopVerdict(
         stop=reason is not None,
         reason=reason,
-        why=_sentence(rule, reason, len(errors), failures, battery_v, because, open_until_flight),
+        why=why,
         failures=failures,
-        threshold=threshold,
+        threshold=None if best is None or rule.kind == "noise" else (1.0 - rule.improvement) * best,
     )
 
 
-def _reason(
-    rule: StopRule, flights: int, failures: int, proposal_kind: Kind | None, battery_v: float | None
-) -> Reason | None:
-    if rule.kind == "noise" and proposal_kind == "none" and flights < rule.max_flights:
-        return "told from noise"
-    if flights >= rule.max_flights:
-        return "flight budget"
-    if rule.kind == "paper" and failures >= FAILURES_ALLOWED:
-        return "not improving"
-    if rule.kind == "paper" and proposal_kind == "none":
-        return "nothing better"
-    if rule.min_battery_v is not None and battery_v is not None and battery_v < rule.min_battery_v:
-        return "battery low"
-    return None
-
-
-def _sentence(
+def _ended(
     rule: StopRule,
-    reason: Reason | None,
     flights: int,
     failures: int,
+    proposal_kind: Kind | None,
     battery_v: float | None,
-    because: str,
     open_until_flight: int,
-) -> str:
-    by = f"more than {percent(rule.improvement)}"
-    if reason is None and rule.kind == "paper" and failures:
-        return f"The last flight did not improve on the best before it by {by}; one more such flight ends the campaign."
-    if reason is None:
-        left = rule.max_flights - flights
-        return f"{left} of {rule.max_flights} flights {'is' if left == 1 else 'are'} left."
-    sentences: dict[Reason, str] = {
-        "flight budget": f"All {rule.max_flights} flights of the budget have been flown."
-        if rule.max_flights > 1 and rule.max_flights >= open_until_flight
-        else f"The budget of {describe_budget(rule.max_flights, open_until_flight)} has been flown.",
-        "not improving": f"The last {failures} consecutive flights did not improve on the best before them by {by}.",
-        "nothing better": "The model predicts no improvement over the best flight.",
-        "told from noise": "",
-        "aborted again": "",
-        "battery low": f"The last flight ended at {battery_v or 0.0:.2f} V; the minimum is {rule.min_battery_v} V.",
-    }
-    return f"{sentences[reason]} {because if rule.kind == 'noise' else ''}".strip()
+) -> tuple[Reason, str] | None:
+    """Why the campaign ends, as a sentence too; None if it goes on."""
+    if rule.kind == "noise" and proposal_kind == "none" and flights < rule.max_flights:
+        return "told from noise", ""
+    if flights >= rule.max_flights:
+        is_plain = rule.max_flights > 1 and rule.max_flights >= open_until_flight
+        budget = describe_budget(rule.max_flights, open_until_flight)
+        every = f"All {rule.max_flights} flights of the budget have been flown."
+        return "flight budget", every if is_plain else f"The budget of {budget} has been flown."
+    if rule.kind == "paper" and failures >= FAILURES_ALLOWED:
+        by = f"more than {percent(rule.improvement)}"
+        why = f"The last {failures} consecutive flights did not improve on the best before them by {by}."
+        return "not improving", why
+    if rule.kind == "paper" and proposal_kind == "none":
+        return "nothing better", "The model predicts no improvement over the best flight."
+    if rule.min_battery_v is not None and battery_v is not None and battery_v < rule.min_battery_v:
+        return "battery low", f"The last flight ended at {battery_v:.2f} V; the minimum is {rule.min_battery_v} V."
+    return None

@@ -1,16 +1,17 @@
 """Interface of a strategy: a pure function of a campaign's definition and its flights."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Final, Literal, Protocol
 
-from app.core.definition import Definition, Flight, Option
+from app.core.definition import Option
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
-from app.core.policy import PolicySpace, Vector
-from app.core.records.trajectory import Trajectory
+from app.core.policy import Gains, Vector
+from app.core.records.trajectory import Samples, Trajectory
+from app.core.tuning.evidence import Evidence
 
-ErrorsOf = Callable[[Matrix], Vector]
-"""Gains (k, g) → the errors a model predicts for them, (k,)."""
+CONFIDENCE: Final = 0.9
+"""Probability with which a predicted interval contains the error of a flight."""
 
 Kind = Literal["start", "step", "shorter step", "repeat", "baseline", "manual", "none"]
 
@@ -41,7 +42,13 @@ class Interval:
         return self.lower <= error <= self.upper
 
 
-class ModelPrediction(NamedTuple):
+def positive_interval(lower: float, upper: float) -> Interval:
+    """The interval, cut off at zero: an error is never negative."""
+    return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelPrediction:
     """Output and error that a model predicts for one gain set; with an interval if the model has one of its own."""
 
     trajectory: Trajectory
@@ -49,8 +56,14 @@ class ModelPrediction(NamedTuple):
     interval: Interval | None = None
 
 
-PredictionOf = Callable[[Vector], ModelPrediction]
-"""Gains (g,) → what a model predicts for their flight."""
+class Predictor(Protocol):
+    """A model that predicts the flights of one campaign."""
+
+    def predict(self, gains: Vector) -> ModelPrediction:
+        """A flight with these gains, shape (g,)."""
+
+    def errors(self, gains: Matrix) -> Vector:
+        """The errors of many gain sets: (k, g) → (k,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,25 +106,42 @@ class Proposal:
     spread: ParameterDistribution | None = None
 
 
+def proposal_of(
+    kind: Kind,
+    gains: Gains,
+    predicted: ModelPrediction | None,
+    explanation: Explanation,
+    *,
+    spread: ParameterDistribution | None = None,
+) -> Proposal:
+    """The proposal of gains with what a model predicts for them, None without a model."""
+    return Proposal(
+        kind=kind,
+        gains=dict(gains),
+        predicted=None if predicted is None else predicted.trajectory,
+        predicted_error=None if predicted is None else predicted.error,
+        explanation=explanation,
+        interval=None if predicted is None else predicted.interval,
+        spread=spread,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strategy:
     """A registered strategy.
 
-    `propose(definition, experiment, space, flights)` requires at least one valid flight. `predict_errors(definition,
-    experiment, flights)` returns the model from which the predicted errors of its proposals come, for many gain sets;
-    `predict_flight(definition, experiment, flights)` the same model for one set, with the curve.
-    `kinds` are those of the experiments it supports; empty for all. `corrects_model`: whether its predictions are
-    corrected by the flight that its explanation names as the base. `needs_model`: whether it searches for gains on a
-    model.
+    `propose` and `model` require at least one valid flight. `model` is the one from which the predictions of its
+    proposals come. `kinds` are those of the experiments it supports; empty for all. `corrects_model`: whether its
+    predictions are corrected by the flight that its explanation names as the base. `needs_model`: whether it searches
+    for gains on a model.
     """
 
     name: str
     title: str
     line: str
     options: tuple[Option, ...]
-    propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
-    predict_errors: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
-    predict_flight: Callable[[Definition, ModelledExperiment, Sequence[Flight]], PredictionOf]
+    propose: Callable[[Evidence[ModelledExperiment]], Proposal]
+    model: Callable[[Evidence[ModelledExperiment]], Predictor]
     kinds: tuple[type[object], ...] = ()
     corrects_model: bool = True
     needs_model: bool = True
@@ -125,3 +155,11 @@ class Strategy:
 def band_channels(output: str) -> tuple[str, str]:
     """Names of the channels with the lower and the upper edge of a predicted output's band."""
     return f"{output}_lower", f"{output}_upper"
+
+
+def with_band(
+    experiment: Experiment, curve: Samples, lower: Samples, upper: Samples, *, source: str = "model"
+) -> Trajectory:
+    """A predicted curve on the experiment's grid with the two edges of its band."""
+    edges = dict(zip(band_channels(experiment.output), (lower, upper), strict=True))
+    return Trajectory(experiment.grid_s, {experiment.output: curve, **edges}, source, "simulation")

@@ -22,8 +22,9 @@ from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import percent
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.campaign_models import is_calibrated
+from app.core.tuning.campaign_models import CALIBRATED, as_flown
 from app.core.tuning.corrected_model import correct_by_bias
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.predictions import offset_sensitivity
 
 LEAST_AGREEMENT: Final = 0.5
@@ -45,6 +46,20 @@ class Transfer:
     step_fraction: float
     agreement: float | None
     sentence: str
+
+
+def informed_evidence(
+    definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight | None
+) -> tuple[Evidence[ModelledExperiment], str]:
+    """The evidence of the flights, with the model and the step limit that follow from the donor's flight and with the
+    autopilot's parameters as flown; and a sentence about the transfer, empty if there is none."""
+    sentence = ""
+    if donor is not None:
+        warm = transfer(definition, experiment, flights, donor)
+        experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
+        sentence = warm.sentence
+    modelled = as_flown(experiment, flights, donor)
+    return Evidence(definition=definition, experiment=modelled, flights=flights), sentence
 
 
 def transfer(
@@ -72,7 +87,7 @@ def transfer(
         experiment=_informed(experiment, donor, agreed),
         step_fraction=definition.step_fraction * (agreed if is_first_step else 1.0),
         agreement=agreed,
-        sentence=f"{_TAKEN[is_calibrated(experiment)]}: {numbers}.{shortened}",
+        sentence=f"{_TAKEN[isinstance(experiment, CALIBRATED)]}: {numbers}.{shortened}",
     )
 
 
@@ -91,8 +106,8 @@ def _informed(experiment: ModelledExperiment, donor: Flight, agreed: float) -> M
 
     The experiment itself if there is no calibration for it.
     """
-    if not is_calibrated(experiment):
+    if not isinstance(experiment, CALIBRATED):
         return experiment
     fitted = calibrate(experiment, (donor,))
-    prior = np.array([parameter.prior_sd for parameter in experiment.model_parameters])
-    return experiment.informed(fitted.model, np.sqrt(np.diag(fitted.covariance) + (1.0 - agreed) * prior**2))
+    variances = np.diag(fitted.covariance) + (1.0 - agreed) * experiment.prior_sd**2
+    return experiment.informed(fitted.model, np.sqrt(variances))

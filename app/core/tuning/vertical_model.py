@@ -10,7 +10,7 @@ from app.core.analysis.linear_guidance import LinearGuidance
 from app.core.analysis.loop import GainSpace
 from app.core.definition import Flight, best_flight
 from app.core.experiments.altitude_steps import AltitudeSteps
-from app.core.experiments.base import FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
+from app.core.experiments.base import FittedParameter, Matrix, ParameterDistribution
 from app.core.experiments.copter_steps_hazards import COPTERS
 from app.core.experiments.takeoff import Takeoff
 from app.core.experiments.vertical_loop import VerticalLoop
@@ -35,7 +35,11 @@ _E = TypeVar("_E", bound=VerticalLoop)
 
 
 class VerticalModel(Generic[_E]):
-    """The part of a `CampaignModel` that both experiments share: the calibration, and what it predicts."""
+    """The part of a `CampaignModel` that both experiments share: the calibration, and what it predicts.
+
+    `numbers` are the flights that were fitted; `base` is the best of them, by whose deviation from the model every
+    prediction is corrected.
+    """
 
     def __init__(self, experiment: _E, flights: Sequence[Flight]) -> None:
         self._experiment: Final = experiment
@@ -45,6 +49,7 @@ class VerticalModel(Generic[_E]):
 
     @property
     def searched(self) -> tuple[str, ...]:
+        """Names of the gains that the optimum may change."""
         return self._experiment.space.names
 
     @property
@@ -56,6 +61,7 @@ class VerticalModel(Generic[_E]):
         return self._calibration.spread()
 
     def rounded(self, gains: Vector) -> Vector:
+        """The nearest gains that a flight uses."""
         return np.rint(gains)
 
     def predict(self, gains: Vector) -> FlightPrediction:
@@ -69,6 +75,7 @@ class TakeoffModel(VerticalModel[Takeoff]):
     """A `CampaignModel`. The optimum is the robust one over a few plausible models (`trust_region`)."""
 
     least_improvement: Final = 0.005
+    """Relative improvement below which a step is not worth a flight."""
 
     @cached_property
     def _models(self) -> Matrix:
@@ -79,13 +86,16 @@ class TakeoffModel(VerticalModel[Takeoff]):
         return find_robust_optimum(self._experiment, box, self._models, box.nearest(here)[np.newaxis])
 
     def merits(self, gains: Matrix) -> Vector:
+        """What `optimum` minimises, in the error's unit: (c, n) → (c,)."""
         return merit(self._experiment, gains, self._models)
 
     def is_worth_a_flight(self, here: Vector, there: Vector) -> bool:
+        """Whether the step from `here`, which was flown, is predicted to pay."""
         now, then = self.merits(np.stack((here, there))).tolist()
         return bool(then <= (1.0 - self.least_improvement) * now)
 
     def notes(self, gains: Vector) -> tuple[str, ...]:  # noqa: ARG002 - the gate's checks say what limits them
+        """Sentences about what limits these gains."""
         return ()
 
 
@@ -96,9 +106,7 @@ class StepsModel(VerticalModel[AltitudeSteps], LimitedModel[Vector]):
 
     def __init__(self, experiment: AltitudeSteps, flights: Sequence[Flight]) -> None:
         super().__init__(experiment, flights)
-        first = next(flight for flight in flights if flight.outcome == "valid")
-        self.policy_space = experiment.space
-        self.first_gains = experiment.space.vector(first.gains)
+        self._limit_by(experiment.space, flights)
 
     @cached_property
     def vehicles(self) -> Sequence[Vector]:
@@ -126,15 +134,3 @@ class StepsModel(VerticalModel[AltitudeSteps], LimitedModel[Vector]):
 
     def notes(self, gains: Vector) -> tuple[str, ...]:
         return self.limits(gains)
-
-
-def fit_takeoff(experiment: ModelledExperiment, flights: Sequence[Flight]) -> TakeoffModel:
-    """The model of these flights; at least one must be valid."""
-    assert isinstance(experiment, Takeoff)
-    return TakeoffModel(experiment, flights)
-
-
-def fit_steps(experiment: ModelledExperiment, flights: Sequence[Flight]) -> StepsModel:
-    """The model of these flights; at least one must be valid."""
-    assert isinstance(experiment, AltitudeSteps)
-    return StepsModel(experiment, flights)

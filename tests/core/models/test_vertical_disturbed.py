@@ -5,6 +5,7 @@ from app.core.definition import Definition
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import correct_in_loop
 from app.core.tuning.strategies.gradient import propose
+from tests.core.tuning.defined import evidence
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
@@ -33,7 +34,7 @@ def test_until_the_flights_first_thrust_nothing_moves() -> None:
 @compiled_only
 def test_the_gradient_corrects_inside_where_it_is_asked_to_and_can() -> None:
     flight = fly(1, DEFAULT)
-    proposal = propose(Definition(options={"bias": "inside"}), TAKEOFF, TAKEOFF.space, [flight])
+    proposal = propose(evidence(Definition(options={"bias": "inside"}), TAKEOFF, [flight]))
     assert proposal.kind == "step"
     assert any("inside the control loop" in note for note in proposal.explanation.notes)
 
@@ -43,7 +44,7 @@ def test_without_the_thrust_command_the_correction_stays_outside_and_says_so() -
     flight = fly(1, DEFAULT)
     bare = Trajectory(flight.trajectory.time_s, {"altitude_m": flight.trajectory["altitude_m"]}, "csv", "vehicle")
     recorded = type(flight)(number=1, gains=flight.gains, trajectory=bare, error=flight.error, outcome="valid")
-    inside = propose(Definition(options={"bias": "inside"}), TAKEOFF, TAKEOFF.space, [recorded])
-    outside = propose(Definition(), TAKEOFF, TAKEOFF.space, [recorded])
+    inside = propose(evidence(Definition(options={"bias": "inside"}), TAKEOFF, [recorded]))
+    outside = propose(evidence(Definition(), TAKEOFF, [recorded]))
     assert inside.gains == outside.gains
     assert any("inside is impossible because flight 1 was recorded without" in n for n in inside.explanation.notes)

@@ -15,7 +15,6 @@ from app.core.experiments.base import (
     ParameterDistribution,
     Scatter,
     SimplexSearch,
-    informed_parameters,
 )
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -53,11 +52,8 @@ class QuadraticExperiment(ModelledExperiment):
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         return self
 
-    def informed(self, mean: Vector, sd: Vector) -> Self:
-        return type(self)(informed_parameters(self.model_parameters, mean, sd))
-
-    def set_point(self, time_s: Samples) -> Samples:
-        return np.zeros_like(time_s)
+    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
+        return type(self)(model_parameters)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         return Trajectory(self.grid_s, {"depth": self.outputs(gains[np.newaxis], model)[0]}, "model", "simulation")
@@ -65,12 +61,6 @@ class QuadraticExperiment(ModelledExperiment):
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         depth = 1.0 + ((gains[:, :1] - 30.0) / 10.0) ** 2 + ((gains[:, 1:] - 40.0) / 10.0) ** 2 + model[..., :1]
         return np.tile(depth, (1, len(self.grid_s)))
-
-    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
-        return None
-
-    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
-        raise NotImplementedError
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         return ()

@@ -1,12 +1,15 @@
 """The core's functions of a definition, with the experiment that it names."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from app.autopilots.experiments import EXPERIMENTS, experiment_of
 from app.core.definition import Definition, Flight
 from app.core.errors import Problem
-from app.core.policy import Gains
+from app.core.experiments.base import ModelledExperiment
+from app.core.policy import Gains, PolicySpace
 from app.core.tuning import definition_checks, flight_predictor, landscape, proposals
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.flight_predictor import FlightPredictor
 from app.core.tuning.landscape import LandscapeGrid, LandscapePlan
 from app.core.tuning.strategy import Proposal
@@ -40,3 +43,11 @@ def problems_of(definition: Definition) -> tuple[Problem, ...]:
 
 def check_definition(definition: Definition) -> None:
     definition_checks.check_definition(definition, EXPERIMENTS)
+
+
+def evidence(
+    definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], space: PolicySpace | None = None
+) -> Evidence[ModelledExperiment]:
+    """Of these flights, within the bounds of `space` if it is given."""
+    bounds = definition.bounds if space is None else {gain.name: (gain.lower, gain.upper) for gain in space.gains}
+    return Evidence(definition=replace(definition, bounds=bounds), experiment=experiment, flights=flights)

@@ -12,9 +12,9 @@ from tests.core.tuning.flying import fly as take_off
 
 def test_the_corrected_model_reproduces_the_flight_that_corrected_it() -> None:
     flight = take_off(1, {"kp": 283, "ki": 13, "kd": 82})
-    trajectory, error = correct_by_bias(TAKEOFF, flight).predict(TAKEOFF.space.default)
-    assert trajectory["altitude_m"] == pytest.approx(flight.trajectory["altitude_m"], abs=1e-12)
-    assert error == pytest.approx(flight.error, abs=1e-12)
+    found = correct_by_bias(TAKEOFF, flight).predict(TAKEOFF.space.default)
+    assert found.trajectory["altitude_m"] == pytest.approx(flight.trajectory["altitude_m"], abs=1e-12)
+    assert found.error == pytest.approx(flight.error, abs=1e-12)
 
 
 def test_a_fresh_flight_corrects_bit_for_bit_like_a_stored_one() -> None:

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from app.core.definition import Flight, Prediction
+from app.core.definition import Definition, Flight, Prediction
 from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
-from app.core.tuning.predictions import interval_scale, prediction_of, repeat_proposal, track_record, with_interval
-from app.core.tuning.strategy import Explanation, Proposal
+from app.core.tuning.predictions import interval_scale, repeat_proposal, track_record, with_interval
+from app.core.tuning.strategy import Explanation, Proposal, proposal_of
+from bench.predictions import prediction_of
 from tests.core.tuning.bowl import OFFSET, QuadraticExperiment, fly
+from tests.core.tuning.defined import evidence
 
 SCATTER = PooledScatter(sigma=0.01, degrees_of_freedom=4.0)
 T = float(stats.t.ppf(0.95, 4))
@@ -27,16 +29,14 @@ def told(flight: Flight, error: float, half: float | None = None) -> Flight:
 
 def proposal(a: float, b: float, base: Flight | None = None) -> Proposal:
     model = uncorrected_model(QuadraticExperiment()) if base is None else correct_by_bias(QuadraticExperiment(), base)
-    predicted, error = model.predict(QuadraticExperiment.space.vector({"a": a, "b": b}))
-    return Proposal(kind="step", gains={"a": a, "b": b}, predicted=predicted, predicted_error=error, explanation=WHY)
+    gains = {"a": a, "b": b}
+    return proposal_of("step", gains, model.predict(QuadraticExperiment.space.vector(gains)), WHY)
 
 
 def test_a_model_whose_bias_takes_everything_away_leaves_the_scatter_of_two_flights() -> None:
     """The bowl's only parameter is an offset, which the bias of the base flight holds whatever it is."""
     base = fly(1, 50, 50)
-    found = with_interval(
-        QuadraticExperiment(), QuadraticExperiment.space, [base], proposal(30, 40, base), SCATTER, base=base
-    )
+    found = with_interval(evidence(Definition(), QuadraticExperiment(), [base]), proposal(30, 40, base), base=base)
     assert found.interval is not None
     assert found.predicted is not None
     half = T * 0.01 * np.sqrt(2.0)
@@ -49,21 +49,16 @@ def test_a_model_whose_bias_takes_everything_away_leaves_the_scatter_of_two_flig
 
 def test_repeats_of_the_base_narrow_the_interval() -> None:
     flights = [fly(1, 50, 50), fly(2, 50, 50), fly(3, 50, 50)]
-    found = with_interval(
-        QuadraticExperiment(),
-        QuadraticExperiment.space,
-        flights,
-        proposal(30, 40, flights[0]),
-        SCATTER,
-        base=flights[0],
-    )
+    known = evidence(Definition(), QuadraticExperiment(), flights)
+    found = with_interval(known, proposal(30, 40, flights[0]), base=flights[0])
     assert found.interval is not None
-    assert found.interval.upper - found.interval.lower == pytest.approx(2.0 * T * 0.01 * np.sqrt(4.0 / 3.0), rel=1e-6)
+    repeats = stats.t.ppf(0.95, 6) * 0.01 * np.sqrt(4.0 / 6.0)  # two identical repeats beside the prior's four
+    assert found.interval.upper - found.interval.lower == pytest.approx(2.0 * repeats * np.sqrt(4.0 / 3.0), rel=1e-6)
 
 
 def test_before_the_first_flight_the_interval_is_what_a_fit_would_take_for_likely() -> None:
     """The offset has a standard deviation of 0.1; it is the error's own."""
-    found = with_interval(QuadraticExperiment(), QuadraticExperiment.space, [], proposal(60, 60), SCATTER, base=None)
+    found = with_interval(evidence(Definition(), QuadraticExperiment(), []), proposal(60, 60), base=None)
     assert found.interval is not None
     half = (found.interval.upper - found.interval.lower) / 2
     assert half == pytest.approx(T * 0.1, rel=0.25)
@@ -72,7 +67,7 @@ def test_before_the_first_flight_the_interval_is_what_a_fit_would_take_for_likel
 def test_an_interval_is_where_the_likely_models_are_and_holds_the_prediction() -> None:
     """The data sheet says offset 0, experience 0.8."""
     bowl = QuadraticExperiment((replace(OFFSET, expected=0.8, prior_sd=0.05),))
-    found = with_interval(bowl, QuadraticExperiment.space, [], proposal(30, 40), SCATTER, base=None)
+    found = with_interval(evidence(Definition(), bowl, []), proposal(30, 40), base=None)
     assert found.interval is not None
     assert found.predicted is not None
     assert found.predicted_error == pytest.approx(1.0)
@@ -84,18 +79,16 @@ def test_an_interval_is_where_the_likely_models_are_and_holds_the_prediction() -
 def test_what_has_an_interval_or_predicts_nothing_stays_as_it_is() -> None:
     base = fly(1, 50, 50)
     mute = replace(proposal(30, 40), predicted=None, predicted_error=None)
-    assert with_interval(QuadraticExperiment(), QuadraticExperiment.space, [base], mute, SCATTER, base=base) is mute
+    assert with_interval(evidence(Definition(), QuadraticExperiment(), [base]), mute, base=base) is mute
     assert prediction_of(mute) is None
-    done = with_interval(
-        QuadraticExperiment(), QuadraticExperiment.space, [base], proposal(30, 40, base), SCATTER, base=base
-    )
-    assert with_interval(QuadraticExperiment(), QuadraticExperiment.space, [base], done, SCATTER, base=base) is done
+    done = with_interval(evidence(Definition(), QuadraticExperiment(), [base]), proposal(30, 40, base), base=base)
+    assert with_interval(evidence(Definition(), QuadraticExperiment(), [base]), done, base=base) is done
 
 
 def test_a_flight_carries_its_prediction() -> None:
     bare = proposal(30, 40)
     assert prediction_of(bare) == Prediction(error=1.0)
-    done = with_interval(QuadraticExperiment(), QuadraticExperiment.space, [], bare, SCATTER, base=None)
+    done = with_interval(evidence(Definition(), QuadraticExperiment(), []), bare, base=None)
     assert done.interval is not None
     assert prediction_of(done) == Prediction(error=1.0, lower=done.interval.lower, upper=done.interval.upper)
 

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
-from app.core.tuning.predictions import prediction_of
 from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
+from bench.predictions import prediction_of
 from tests.core.tuning.defined import next_proposal, problems_of
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 

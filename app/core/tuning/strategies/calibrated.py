@@ -7,20 +7,19 @@ until it passes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, aborted_by_gains, was_flown
+from app.core.definition import Flight, aborted_by_gains, was_flown
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
 from app.core.policy import PolicySpace, Vector
-from app.core.tuning.campaign_model import CampaignModel
-from app.core.tuning.campaign_models import FITS, fit_of
+from app.core.tuning.campaign_models import FITTED, CampaignModel, fit
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import allows
 from app.core.tuning.predictions import FlightPrediction
-from app.core.tuning.strategy import ErrorsOf, Explanation, Kind, ModelPrediction, PredictionOf, Proposal, Strategy
+from app.core.tuning.strategy import Explanation, Kind, Proposal, Strategy, proposal_of
 from app.core.tuning.trust_region import Box, trust_fraction
 
 _HALVINGS: Final = 5
@@ -37,22 +36,20 @@ class _ChosenGains:
     notes: tuple[str, ...] = ()
 
 
-def propose(
-    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
-) -> Proposal:
+def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
     """Propose the optimum of the calibrated model, within the trust region. At least one flight must be valid.
 
     Raises TypeError for experiments without such a model, and TrajectoryError if a record does not suffice for it.
     """
-    model = _fitted(experiment, flights)
+    space, flights, model = evidence.space, evidence.flights, fitted_model(evidence)
     base = model.base
-    fraction = min(trust_fraction(flights), definition.step_fraction)
+    fraction = min(trust_fraction(flights), evidence.definition.step_fraction)
     box = Box(*space.reachable(space.vector(base.gains), fraction))
-    choice = _choose(definition, experiment, space, flights, model, box)
+    choice = _choose(evidence, model, box)
     prediction = model.predict(choice.gains)
     at_end = space.names_where((choice.optimum <= box.low) | (choice.optimum >= box.high))
     explanation = Explanation(
-        summary=_summary(experiment, model, choice, prediction) + _describe_limit(fraction, flights),
+        summary=_summary(evidence.experiment, model, choice, prediction) + _describe_limit(fraction, flights),
         base_flight=base.number,
         gradient=_gradient(space, space.nearest(space.vector(base.gains)), model),
         direction=space.by_name(choice.gains - space.vector(base.gains)),
@@ -66,47 +63,16 @@ def propose(
         fitted=model.fitted,
         trust_fraction=fraction,
     )
-    return Proposal(
-        kind=choice.kind,
-        gains=space.mapping(choice.gains),
-        predicted=prediction.trajectory,
-        predicted_error=prediction.error,
-        explanation=explanation,
-        interval=prediction.interval,
-        spread=model.spread,
-    )
+    return proposal_of(choice.kind, space.mapping(choice.gains), prediction, explanation, spread=model.spread)
 
 
-def error_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors predicted by the calibrated model. At least one flight must be valid."""
-    return _fitted(experiment, flights).errors
+def fitted_model(evidence: Evidence[ModelledExperiment]) -> CampaignModel:
+    """The calibrated model. At least one flight must be valid."""
+    return fit(evidence.experiment, evidence.flights)
 
 
-def flight_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
-    """The flights predicted by the calibrated model. At least one flight must be valid."""
-    return partial(_predict, _fitted(experiment, flights))
-
-
-def _fitted(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CampaignModel:
-    fit = fit_of(experiment)
-    if fit is None:
-        raise TypeError(f"calibrated does not work with {experiment.name}")
-    return fit(experiment, flights)
-
-
-def _predict(model: CampaignModel, gains: Vector) -> ModelPrediction:
-    found = model.predict(gains)
-    return ModelPrediction(found.trajectory, found.error, found.interval)
-
-
-def _choose(
-    definition: Definition,
-    experiment: ModelledExperiment,
-    space: PolicySpace,
-    flights: Sequence[Flight],
-    model: CampaignModel,
-    box: Box,
-) -> _ChosenGains:
+def _choose(evidence: Evidence[ModelledExperiment], model: CampaignModel, box: Box) -> _ChosenGains:
+    space, flights = evidence.space, evidence.flights
     here = space.nearest(space.vector(model.base.gains))
     optimum = model.optimum(box)
     if optimum is None:
@@ -115,11 +81,11 @@ def _choose(
         return _ChosenGains("none", here, optimum)
     for halvings in range(_HALVINGS):
         gains = np.clip(model.rounded(here + (optimum - here) / 2**halvings), box.low, box.high)
-        if was_flown(space.mapping(gains), [flight for flight in flights if flight.outcome == "valid"]):
+        if was_flown(space.mapping(gains), evidence.valid):
             break
         if was_flown(space.mapping(gains), flights):
             continue
-        if allows(definition, experiment, gains, model.spread):
+        if allows(evidence, gains, model.spread):
             if halvings == 0:
                 return _ChosenGains("step", gains, optimum)
             note = (
@@ -141,12 +107,7 @@ def _gradient(space: PolicySpace, base: Vector, model: CampaignModel) -> dict[st
     """∂merit/∂gain at the best flight by central differences; zero for a pinned gain."""
     steps = _DIFFERENCE * space.scale
     whole = [gain.integer for gain in space.gains]
-    steps = np.diag(np.where(whole, np.maximum(np.rint(steps), 1.0), steps))
-    above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
-    errors = model.merits(np.concatenate((above, below)))
-    run = np.diag(above - below)
-    rise = errors[: len(base)] - errors[len(base) :]
-    return space.by_name(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
+    return space.by_name(space.slopes(model.merits, base, np.where(whole, np.maximum(np.rint(steps), 1.0), steps)))
 
 
 def _summary(
@@ -200,7 +161,6 @@ CALIBRATED: Final = Strategy(
     line="Fits the model to all flights and flies its robust optimum. Typically two flights.",
     options=(),
     propose=propose,
-    predict_errors=error_model,
-    predict_flight=flight_model,
-    kinds=tuple(FITS),
+    model=fitted_model,
+    kinds=FITTED,
 )

@@ -7,14 +7,13 @@ A step that the gate would refuse is halved in the same way. With the option of 
 below the last successful step.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, Option, aborted_by_gains, best_flight, was_flown
+from app.core.definition import Flight, Option, aborted_by_gains, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.vertical_loop import VerticalLoop
@@ -22,9 +21,9 @@ from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.campaign_models import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import allows
-from app.core.tuning.predictions import predict_corrected
-from app.core.tuning.strategy import ErrorsOf, Explanation, LadderStep, PredictionOf, Proposal, Strategy
+from app.core.tuning.strategy import Explanation, Kind, LadderStep, Proposal, Strategy, proposal_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,22 +90,14 @@ def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vec
     The step to each side is the experiment's share of `scale`, at least 2 counts for integer gains, and limited by the
     bounds; zero where the bounds pin a gain.
     """
-    integer = np.array([gain.integer for gain in space.gains])
     wanted = model.experiment.difference * scale
-    steps = np.where(integer, np.maximum(np.rint(wanted), MIN_DIFFERENCE), wanted)
-    above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
-    ups = np.where(np.eye(len(base), dtype=bool), above, base)
-    downs = np.where(np.eye(len(base), dtype=bool), below, base)
-    errors = model.errors(np.concatenate((ups, downs)))
-    rise, run = errors[: len(base)] - errors[len(base) :], above - below
-    return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
+    whole = [gain.integer for gain in space.gains]
+    return space.slopes(model.errors, base, np.where(whole, np.maximum(np.rint(wanted), MIN_DIFFERENCE), wanted))
 
 
-def _scaled_metric(space: PolicySpace) -> _Metric:
-    return _Metric(space.scale, SCALED_LADDER, "gain scale")
-
-
-def _raw_metric(space: PolicySpace) -> _Metric:
+def _metric(space: PolicySpace, *, scaled: bool) -> _Metric:
+    if scaled:
+        return _Metric(space.scale, SCALED_LADDER, "gain scale")
     whole = any(gain.integer for gain in space.gains)
     return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain unit")
 
@@ -125,17 +116,16 @@ def longest_step(space: PolicySpace, scale: Vector, flights: Sequence[Flight]) -
     return float(np.linalg.norm(last)) * (len(bests) - 1) / len(bests)
 
 
-def propose(
-    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
-) -> Proposal:
+def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
     """Propose the next gains on the line from the best flight. At least one flight must be valid."""
-    metric = _scaled_metric(space) if definition.options.get("scaled", True) else _raw_metric(space)
+    definition, space, flights = evidence.definition, evidence.space, evidence.flights
+    metric = _metric(space, scaled=bool(definition.options.get("scaled", True)))
     limit = longest_step(space, metric.scale, flights) if definition.options.get("step_size") == "diminishing" else None
     if limit is not None:
         metric = replace(metric, ladder=(limit, *(length for length in metric.ladder if length < limit)))
-    base = best_flight(flights)
+    base = evidence.best
     base_gains = space.nearest(space.vector(base.gains))
-    model, correction = _corrected(definition, experiment, base)
+    model, correction = _corrected(evidence)
     slopes = gradient(model, space, base_gains, metric.scale)
     steepness = float(np.linalg.norm(slopes * metric.scale))
     direction = -slopes * metric.scale**2 / (steepness or 1.0)
@@ -143,44 +133,37 @@ def propose(
     ladder = evaluate_lengths(line, metric.ladder, model)
     best = min(ladder, key=lambda step: step.predicted_error)
     now = float(model.errors(base_gains[np.newaxis])[0])
-    spread = known_distribution(experiment, flights)
+    spread = known_distribution(evidence.experiment, flights)
 
     def passes(gains: Vector) -> bool:
-        return allows(definition, experiment, gains, spread)
+        return allows(evidence, gains, spread)
 
     chosen, refused = (
         _first_allowed_step(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
     )
+    notes = [correction, f"Step sizes are in {metric.unit}s: one is {format_gains(space.by_name(metric.scale))}."]
+    if limit is not None:
+        notes.append(f"After the last successful step this one is at most {metric.describe(limit)}.")
+    if refused:
+        notes.append(f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}.")
     explanation = Explanation(
-        summary=_summary(experiment, base, best, chosen, metric, refused, flights),
+        summary=_summary(evidence, best, chosen, metric, refused),
         base_flight=base.number,
         gradient=space.by_name(slopes),
         direction=space.by_name(direction),
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
-        notes=(correction, _describe_unit(space, metric), *_describe_limit(metric, limit), *_notes(refused)),
+        notes=tuple(notes),
     )
     gains = space.mapping(base_gains) if chosen is None else chosen.gains
-    trajectory, error = model.predict(space.vector(gains))
-    return Proposal(
-        kind="none" if chosen is None else "step" if chosen is best else "shorter step",
-        gains=gains,
-        predicted=trajectory,
-        predicted_error=error,
-        explanation=explanation,
-        spread=spread,
-    )
+    kind: Kind = "none" if chosen is None else "step" if chosen is best else "shorter step"
+    return proposal_of(kind, gains, model.predict(space.vector(gains)), explanation, spread=spread)
 
 
-def error_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the model corrected by the best flight. At least one flight must be valid."""
-    return _corrected(definition, experiment, best_flight(flights))[0].errors
-
-
-def flight_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
-    """The flights of the same model."""
-    return partial(predict_corrected, _corrected(definition, experiment, best_flight(flights))[0])
+def corrected_model(evidence: Evidence[ModelledExperiment]) -> CorrectedModel:
+    """The model corrected by the best flight. At least one flight must be valid."""
+    return _corrected(evidence)[0]
 
 
 def _first_allowed_step(
@@ -196,7 +179,7 @@ def _first_allowed_step(
     base.
     """
     refused: list[LadderStep] = []
-    for length in _halvings(best.length):
+    for length in (best.length / 2**halvings for halvings in range(_HALVINGS)):
         gains = line.at(length)
         if np.array_equal(gains, line.base):
             break
@@ -209,20 +192,14 @@ def _first_allowed_step(
     return None, tuple(refused)
 
 
-def _halvings(length: float) -> Iterator[float]:
-    return (length / 2**halvings for halvings in range(_HALVINGS))
-
-
 def _summary(
-    experiment: ModelledExperiment,
-    base: Flight,
+    evidence: Evidence[ModelledExperiment],
     best: LadderStep,
     chosen: LadderStep | None,
     metric: _Metric,
     refused: Sequence[LadderStep],
-    flights: Sequence[Flight],
 ) -> str:
-    unit = experiment.error_unit
+    unit, base = evidence.experiment.error_unit, evidence.best
     best_so_far = f"flight {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}"
     origin = f"The best flight so far is {best_so_far}."
     if chosen is None:
@@ -236,7 +213,7 @@ def _summary(
             f"flight, a step of {metric.describe(chosen.length)} gives the lowest predicted error: "
             f"{short(chosen.predicted_error)} {unit}."
         )
-    aborted = aborted_by_gains(flights, best.gains)
+    aborted = aborted_by_gains(evidence.flights, best.gains)
     why = "is refused by the gate" if refused else "was aborted" if aborted else "did not improve on it"
     return (
         f"{origin} The longer step in the same direction {why}, so the next one is shorter, {chosen.length:.4g} "
@@ -244,26 +221,15 @@ def _summary(
     )
 
 
-def _corrected(definition: Definition, experiment: ModelledExperiment, base: Flight) -> tuple[CorrectedModel, str]:
+def _corrected(evidence: Evidence[ModelledExperiment]) -> tuple[CorrectedModel, str]:
     """The corrected model, and a sentence about how it is corrected."""
-    if definition.options.get("bias") != "inside":
+    experiment, base = evidence.experiment, evidence.best
+    if evidence.definition.options.get("bias") != "inside":
         return correct_by_bias(experiment, base), f"{_OUTSIDE}."
     if (inside := correct_in_loop(experiment, base)) is not None:
         return inside, "The correction is added to the state in every step, inside the control loop."
     missing = f"flight {base.number} was recorded without all of its state and its command"
     return correct_by_bias(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
-
-
-def _describe_unit(space: PolicySpace, metric: _Metric) -> str:
-    return f"Step sizes are in {metric.unit}s: one is {format_gains(space.by_name(metric.scale))}."
-
-
-def _describe_limit(metric: _Metric, limit: float | None) -> tuple[str, ...]:
-    return () if limit is None else (f"After the last successful step this one is at most {metric.describe(limit)}.",)
-
-
-def _notes(refused: Sequence[LadderStep]) -> tuple[str, ...]:
-    return (f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}.",) if refused else ()
 
 
 GRADIENT: Final = Strategy(
@@ -291,7 +257,6 @@ GRADIENT: Final = Strategy(
         ),
     ),
     propose=propose,
-    predict_errors=error_model,
-    predict_flight=flight_model,
+    model=corrected_model,
     kinds=(VerticalLoop, PitchTracking),
 )

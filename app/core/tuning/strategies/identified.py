@@ -1,31 +1,27 @@
 """Identify the aircraft's model from the flights, then fly its optimum."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, Option, best_flight, was_flown
-from app.core.experiments.base import Matrix, ModelledExperiment, ParameterDistribution, fitted_parameters, halton
+from app.core.definition import Option, was_flown
+from app.core.experiments.base import Matrix, ModelledExperiment, fitted_parameters, halton, normal_distribution
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.formatting import format_gains, named_flights, short
 from app.core.models.f16 import STEP_S
 from app.core.policy import PolicySpace, Vector
-from app.core.records.trajectory import Samples, Trajectory
-from app.core.tuning.corrected_model import Optimum, model_optimum, uncorrected_model
+from app.core.tuning.corrected_model import CorrectedModel, Optimum, model_optimum, uncorrected_model
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.identification import Fit, Identified, identify
-from app.core.tuning.predictions import predict_corrected
 from app.core.tuning.strategy import (
-    ErrorsOf,
     Explanation,
-    Interval,
     ModelPrediction,
-    PredictionOf,
     Proposal,
     Strategy,
-    band_channels,
+    positive_interval,
+    proposal_of,
+    with_band,
 )
 
 _STARTS: Final = 256
@@ -41,66 +37,82 @@ _TAIL: Final = 0.05
 _TAIL_SD: Final = 1.6449
 
 
-def propose(
-    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
-) -> Proposal:
+def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
     """Propose the optimum of the model identified from all flights, within the step limit around the best flight.
 
     At least one flight must be valid.
     """
-    assert isinstance(experiment, PitchTracking)  # definitions with another experiment are refused
-    base = best_flight(flights)
-    fit = _fit_of(definition)
-    found = identify(experiment, flights, fit)
-    if found is None:
-        return _nothing_to_fit(experiment, space, base)
+    space, base, model = evidence.space, evidence.best, identified_model(evidence)
+    if isinstance(model, CorrectedModel):
+        return _nothing_to_fit(model, evidence)
     here = space.nearest(space.vector(base.gains))
-    low, high = space.reachable(here, definition.step_fraction)
-    aircraft = _aircraft(experiment, found)
-    optimum = _optimum(aircraft, space, low, high, here)
+    low, high = space.reachable(here, evidence.definition.step_fraction)
+    optimum = _optimum(model.aircraft, space, low, high, here)
     gains = space.mapping(optimum.gains)
-    expected = _expected_error(aircraft, found, here)
-    predicted_at_optimum = _expected_error(aircraft, found, optimum.gains)
-    stays = was_flown(gains, flights) or predicted_at_optimum > expected - _MIN_IMPROVEMENT * expected
+    expected, predicted_at_optimum = (float(model.errors(each[np.newaxis])[0]) for each in (here, optimum.gains))
+    stays = was_flown(gains, evidence.flights) or predicted_at_optimum > expected - _MIN_IMPROVEMENT * expected
     chosen = space.mapping(here) if stays else gains
-    trajectory, error, interval = _prediction(aircraft, found, space.vector(chosen))
-    return Proposal(
-        kind="none" if stays else "step",
-        gains=chosen,
-        predicted=trajectory,
-        predicted_error=error,
-        interval=interval,
-        explanation=_explanation(experiment, found, fit, base, optimum, space, error, stays=stays),
+    predicted = model.predict(space.vector(chosen))
+    offer = (
+        f"The identified model predicts no sufficient improvement over flight {base.number}, error "
+        f"{short(base.error)} {evidence.experiment.error_unit}."
+        if stays
+        else f"The identified model's optimum is at {format_gains(gains)}; predicted {short(predicted.error)} "
+        f"{evidence.experiment.error_unit}."
     )
+    explanation = Explanation(
+        summary=f"A and B were re-identified from {named_flights(model.found.flights)}. {offer}",
+        base_flight=base.number,
+        notes=(_FITS[_fit_of(evidence)],),
+        lesson="The dynamics under gains far from those flown so far; the next fit uses every flight.",
+        fitted=fitted_parameters(evidence.experiment.model_parameters, model.found.model, model.found.covariance),
+    )
+    return proposal_of("none" if stays else "step", chosen, predicted, explanation)
 
 
-def error_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the model identified from all flights.
+@dataclass(frozen=True, slots=True)
+class IdentifiedModel:
+    """The aircraft as identified: predicts flights and their scores, including the noise of the recorded pitch."""
 
-    Those of the nominal model if no flight recorded the required channels.
-    """
-    assert isinstance(experiment, PitchTracking)
-    found = identify(experiment, flights, _fit_of(definition))
+    aircraft: PitchTracking
+    found: Identified
+
+    def errors(self, gains: Matrix) -> Vector:
+        """Expected scores of flights: gains (k, 6) → (k,)."""
+        outputs = self.aircraft.outputs(gains, self.found.model)
+        return self.aircraft.errors(_folded(outputs, self.found.pitch_noise_rad))
+
+    def predict(self, gains: Vector) -> ModelPrediction:
+        """Predicted output with its band, error, and interval, over models from the fit's distribution."""
+        aircraft, found = self.aircraft, self.found
+        spread = normal_distribution(found.model, found.covariance, origin="the flights")
+        outputs = aircraft.outputs(np.tile(gains, (_MODELS, 1)), spread.sample(aircraft, _MODELS))
+        errors = aircraft.errors(_folded(outputs, found.pitch_noise_rad))
+        error = float(errors[0])
+        noise = found.pitch_noise_rad * np.sqrt(STEP_S * aircraft.grid_s[-1] * (1.0 - 2.0 / np.pi))
+        reach = _TAIL_SD * float(np.hypot(noise, _MODEL_ERROR_SD * error))
+        lowest, highest = np.quantile(errors, (_TAIL, 1.0 - _TAIL))
+        edges, beyond = np.quantile(outputs, (_TAIL, 1.0 - _TAIL), axis=0), _TAIL_SD * found.pitch_noise_rad
+        lower, upper = np.minimum(outputs[0], edges[0]) - beyond, np.maximum(outputs[0], edges[1]) + beyond
+        return ModelPrediction(
+            trajectory=with_band(aircraft, outputs[0], lower, upper),
+            error=error,
+            interval=positive_interval(min(error, float(lowest)) - reach, max(error, float(highest)) + reach),
+        )
+
+
+def identified_model(evidence: Evidence[ModelledExperiment]) -> IdentifiedModel | CorrectedModel:
+    """The model identified from all flights; the nominal one if no flight recorded the required channels."""
+    experiment = evidence.experiment
+    assert isinstance(experiment, PitchTracking)  # definitions with another experiment are refused
+    found = identify(experiment, evidence.flights, _fit_of(evidence))
     if found is None:
-        return uncorrected_model(experiment).errors
-    return partial(_expected_errors, _aircraft(experiment, found), found)
+        return uncorrected_model(experiment)
+    return IdentifiedModel(experiment.informed(found.model, np.sqrt(np.diag(found.covariance))), found)
 
 
-def flight_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
-    """The flights of the same model."""
-    assert isinstance(experiment, PitchTracking)
-    found = identify(experiment, flights, _fit_of(definition))
-    if found is None:
-        return partial(predict_corrected, uncorrected_model(experiment))
-    return partial(_prediction, _aircraft(experiment, found), found)
-
-
-def _aircraft(experiment: PitchTracking, found: Identified) -> PitchTracking:
-    return experiment.informed(found.model, np.sqrt(np.diag(found.covariance)))
-
-
-def _fit_of(definition: Definition) -> Fit:
-    return "map" if definition.options.get("fit", "map") == "map" else "least-squares"
+def _fit_of(evidence: Evidence[ModelledExperiment]) -> Fit:
+    return "map" if evidence.definition.options.get("fit", "map") == "map" else "least-squares"
 
 
 def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vector, base: Vector) -> Optimum:
@@ -133,15 +145,6 @@ def _restarted(aircraft: PitchTracking, space: PolicySpace, start: Vector) -> Op
     return best
 
 
-def _expected_error(aircraft: PitchTracking, found: Identified, gains: Vector) -> float:
-    """Expected score of the flight: the model's error, including the noise of the recorded pitch."""
-    return float(_expected_errors(aircraft, found, gains[np.newaxis])[0])
-
-
-def _expected_errors(aircraft: PitchTracking, found: Identified, gains: Matrix) -> Vector:
-    return aircraft.errors(_folded(aircraft.outputs(gains, found.model), found.pitch_noise_rad))
-
-
 def _folded(outputs: Matrix, noise: float) -> Matrix:
     """Mean of |output + normal noise|; `noise` is its standard deviation, above zero."""
     from scipy.special import erf
@@ -150,75 +153,14 @@ def _folded(outputs: Matrix, noise: float) -> Matrix:
     return np.asarray(noise * np.sqrt(2.0 / np.pi) * np.exp(-(apart**2)) + outputs * erf(apart))
 
 
-def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> ModelPrediction:
-    """Predicted output with its band, error, and interval, over models from the fit's distribution."""
-    spread = ParameterDistribution(
-        mean=tuple(found.model.tolist()),
-        covariance=tuple(tuple(row) for row in found.covariance.tolist()),
-        origin="the flights",
-    )
-    outputs = aircraft.outputs(np.tile(gains, (_MODELS, 1)), spread.sample(aircraft, _MODELS))
-    errors = aircraft.errors(_folded(outputs, found.pitch_noise_rad))
-    error = float(errors[0])
-    noise = found.pitch_noise_rad * np.sqrt(STEP_S * aircraft.grid_s[-1] * (1.0 - 2.0 / np.pi))
-    reach = _TAIL_SD * float(np.hypot(noise, _MODEL_ERROR_SD * error))
-    lowest, highest = np.quantile(errors, (_TAIL, 1.0 - _TAIL))
-    interval = Interval(lower=max(0.0, min(error, float(lowest)) - reach), upper=max(error, float(highest)) + reach)
-    return ModelPrediction(_trajectory(aircraft, outputs, _TAIL_SD * found.pitch_noise_rad), error, interval)
-
-
-def _trajectory(aircraft: PitchTracking, outputs: Matrix, reach: float) -> Trajectory:
-    lower, upper = band_channels(aircraft.output)
-    edges = np.quantile(outputs, (_TAIL, 1.0 - _TAIL), axis=0)
-    channels: dict[str, Samples] = {
-        aircraft.output: outputs[0],
-        lower: np.minimum(outputs[0], edges[0]) - reach,
-        upper: np.maximum(outputs[0], edges[1]) + reach,
-    }
-    return Trajectory(aircraft.grid_s, channels, "model", "simulation")
-
-
-def _nothing_to_fit(experiment: PitchTracking, space: PolicySpace, base: Flight) -> Proposal:
-    trajectory, error = uncorrected_model(experiment).predict(space.vector(base.gains))
+def _nothing_to_fit(model: CorrectedModel, evidence: Evidence[ModelledExperiment]) -> Proposal:
+    base = evidence.best
     summary = (
         "No flight recorded all of its states and commands, so the model cannot be identified. "
         f"The best so far is flight {base.number} ({format_gains(base.gains)})."
     )
-    return Proposal(
-        kind="none",
-        gains=dict(base.gains),
-        predicted=trajectory,
-        predicted_error=error,
-        explanation=Explanation(summary=summary, base_flight=base.number),
-    )
-
-
-def _explanation(
-    experiment: PitchTracking,
-    found: Identified,
-    fit: Fit,
-    base: Flight,
-    optimum: Optimum,
-    space: PolicySpace,
-    error: float,
-    *,
-    stays: bool,
-) -> Explanation:
-    fitted = f"A and B were re-identified from {named_flights(found.flights)}."
-    gains = format_gains(space.mapping(optimum.gains))
-    offer = (
-        f"The identified model predicts no sufficient improvement over flight {base.number}, error "
-        f"{short(base.error)} {experiment.error_unit}."
-        if stays
-        else f"The identified model's optimum is at {gains}; predicted {short(error)} {experiment.error_unit}."
-    )
-    return Explanation(
-        summary=f"{fitted} {offer}",
-        base_flight=base.number,
-        notes=(_FITS[fit],),
-        lesson="The dynamics under gains far from those flown so far; the next fit uses every flight.",
-        fitted=fitted_parameters(experiment.model_parameters, found.model, found.covariance),
-    )
+    explanation = Explanation(summary=summary, base_flight=base.number)
+    return proposal_of("none", base.gains, model.predict(evidence.space.vector(base.gains)), explanation)
 
 
 _FITS: Final[dict[Fit, str]] = {
@@ -239,7 +181,6 @@ IDENTIFIED: Final = Strategy(
         ),
     ),
     propose=propose,
-    predict_errors=error_model,
-    predict_flight=flight_model,
+    model=identified_model,
     kinds=(PitchTracking,),
 )

@@ -12,14 +12,15 @@ from app.core.definition import Definition, Flight, Prediction, StopRule
 from app.core.formatting import short
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.predictions import predict_flight, prediction_of, remaining_bias
+from app.core.tuning.predictions import predict_flight, remaining_bias
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.calibrated import CALIBRATED, propose
 from app.core.tuning.strategy import Proposal
 from app.core.tuning.trust_region import Box, find_robust_optimum, merit
+from bench.predictions import prediction_of
 from tests.core.tuning.bowl import QuadraticExperiment
 from tests.core.tuning.bowl import fly as fly_bowl
-from tests.core.tuning.defined import next_proposal
+from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import ARDRONE, TAKEOFF, TWIN, compiled_only, fly
 
 SPACE = TAKEOFF.space
@@ -43,7 +44,7 @@ def test_it_is_the_first_that_is_offered() -> None:
 
 def test_it_refuses_an_experiment_that_it_is_not_made_for() -> None:
     with pytest.raises(TypeError, match="does not work with bowl"):
-        propose(CALM, QuadraticExperiment(), QuadraticExperiment.space, [fly_bowl(1, 30.0, 40)])
+        propose(evidence(CALM, QuadraticExperiment(), [fly_bowl(1, 30.0, 40)]))
 
 
 @compiled_only
@@ -126,11 +127,11 @@ def test_gains_that_were_aborted_are_not_proposed_again() -> None:
     """Also once a prediction that held has opened the trust region again: then the step is halved."""
     space = SPACE.narrowed({"kp": (400, 500), "ki": (50, 90), "kd": (90, 100)})
     first = fly(1, {"kp": 400, "ki": 50, "kd": 90})
-    proposal = propose(CALM, TAKEOFF, space, [first])
+    proposal = propose(evidence(CALM, TAKEOFF, [first], space))
     assert proposal.kind == "step"
     aborted = replace(fly(2, proposal.gains), outcome="aborted", error=None)
     held = replace(fly(3, first.gains), predicted=Prediction(error=0.5, lower=0.0, upper=1.0))
-    again = propose(CALM, TAKEOFF, space, [first, aborted, held])
+    again = propose(evidence(CALM, TAKEOFF, [first, aborted, held], space))
     assert again.explanation.trust_fraction == 1.0
     assert again.kind == "shorter step"
     assert again.gains != proposal.gains
@@ -153,8 +154,8 @@ def test_gains_that_an_operator_aborted_out_of_caution_are_proposed_again() -> N
 def test_gains_that_flew_worse_than_the_best_are_not_flown_again_however_good_they_look() -> None:
     space = SPACE.narrowed({"kp": (400, 500), "ki": (50, 90), "kd": (90, 100)})
     first = fly(1, {"kp": 400, "ki": 50, "kd": 90})
-    unlucky = replace(fly(2, propose(CALM, TAKEOFF, space, [first]).gains), error=2.0)
-    again = propose(CALM, TAKEOFF, space, [first, unlucky])
+    unlucky = replace(fly(2, propose(evidence(CALM, TAKEOFF, [first], space)).gains), error=2.0)
+    again = propose(evidence(CALM, TAKEOFF, [first, unlucky], space))
     assert (again.kind, again.gains) == ("none", first.gains)
 
 
@@ -162,10 +163,10 @@ def test_gains_that_flew_worse_than_the_best_are_not_flown_again_however_good_th
 def test_a_step_of_one_count_that_was_aborted_leaves_nothing_to_halve() -> None:
     space = SPACE.narrowed({"kp": (283, 283), "ki": (0, 1), "kd": (82, 82)})
     first = fly(1, {"kp": 283, "ki": 0, "kd": 82})
-    assert propose(CALM, TAKEOFF, space, [first]).gains["ki"] == 1
+    assert propose(evidence(CALM, TAKEOFF, [first], space)).gains["ki"] == 1
     aborted = replace(fly(2, {"kp": 283, "ki": 1, "kd": 82}), outcome="aborted", error=None)
     held = replace(fly(3, first.gains), predicted=Prediction(error=0.5, lower=0.0, upper=1.0))
-    assert propose(CALM, TAKEOFF, space, [first, aborted, held]).kind == "none"
+    assert propose(evidence(CALM, TAKEOFF, [first, aborted, held], space)).kind == "none"
 
 
 @compiled_only
@@ -179,7 +180,7 @@ def test_what_the_gate_refuses_is_not_proposed() -> None:
 @compiled_only
 def test_pinned_gains_and_narrow_bounds_are_kept() -> None:
     space = SPACE.narrowed({"kd": (82, 82), "ki": (0, 200)})
-    proposal = propose(CALM, TAKEOFF, space, [fly(1, DEFAULT)])
+    proposal = propose(evidence(CALM, TAKEOFF, [fly(1, DEFAULT)], space))
     assert proposal.gains["kd"] == 82
     assert proposal.gains["ki"] <= 200
     assert proposal.explanation.gradient["kd"] == 0.0

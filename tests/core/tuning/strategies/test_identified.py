@@ -6,10 +6,10 @@ import pytest
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import uncorrected_model
-from app.core.tuning.strategies.identified import error_model
+from app.core.tuning.strategies.identified import identified_model
 from app.core.tuning.strategy import Proposal
 from app.vehicles.f16 import LOG_NOISE
-from tests.core.tuning.defined import next_proposal
+from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import compiled_only
 from tests.core.tuning.test_identification import MODEL, flight
 from tests.vehicles.flying import HAND, TRACKING
@@ -102,7 +102,7 @@ def test_without_recorded_states_the_best_stays_and_it_is_said_why() -> None:
 
 def test_its_landscape_is_the_identified_models_and_holds_for_the_truth() -> None:
     campaign, first = definition(1, fit="least-squares"), flight(1, HAND)
-    errors = error_model(campaign, MODEL, [first])
+    errors = identified_model(evidence(campaign, MODEL, [first])).errors
     for number, gains in enumerate((HAND, TRACKING), start=1):
         truth = flight(number, gains).error
         assert errors(MODEL.space.vector(gains)[np.newaxis])[0] == pytest.approx(truth, rel=0.02)
@@ -112,5 +112,5 @@ def test_without_recorded_states_its_landscape_is_the_nominal_models() -> None:
     first = flight(1, HAND)
     bare = Trajectory(first.trajectory.time_s, {"pitch_error_rad": first.trajectory["pitch_error_rad"]}, "csv", "x")
     points = MODEL.space.vector(TRACKING)[np.newaxis]
-    unseen = error_model(definition(), MODEL, [replace(first, trajectory=bare)])
+    unseen = identified_model(evidence(definition(), MODEL, [replace(first, trajectory=bare)])).errors
     assert unseen(points) == pytest.approx(uncorrected_model(MODEL).errors(points))

@@ -6,7 +6,7 @@ import pytest
 from app.autopilots.experiments import EXPERIMENTS
 from app.core.definition import Definition
 from app.core.tuning.strategies import STRATEGIES
-from tests.core.tuning.defined import next_proposal
+from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
 from tests.core.tuning.test_identification import flight
 from tests.vehicles.flying import HAND
@@ -20,9 +20,9 @@ PAPERS = {"kp": 1624, "ki": 1356, "kd": 195}
 @pytest.mark.parametrize("bounds", [{}, {"kp": (0.0, 600.0), "ki": (0.0, 300.0), "kd": (0.0, 150.0)}])
 def test_every_proposal_lies_inside_the_bounds(strategy: str, bounds: dict[str, tuple[float, float]]) -> None:
     definition = Definition(strategy=strategy, step_fraction=0.25, bounds=bounds)
-    space = TAKEOFF.space.narrowed(bounds)
-    proposal = STRATEGIES[strategy].propose(definition, TAKEOFF, space, [fly(1, PAPERS)])
-    assert space.check(proposal.gains) == proposal.gains
+    known = evidence(definition, TAKEOFF, [fly(1, PAPERS)])
+    proposal = STRATEGIES[strategy].propose(known)
+    assert known.space.check(proposal.gains) == proposal.gains
 
 
 def test_the_region_of_a_base_outside_lies_at_the_nearest_edge() -> None:
