@@ -5,9 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, status
 
 from app.autopilots.loop_check import FigureName
-from app.common.schemas import FigureCard, Page, figure_card
+from app.common.schemas import Page
 from app.controller_checks import service
 from app.controller_checks.service import ControllerCheck, ControllerCheckSummary
+from app.figures.base import Card
 from app.web.dependencies import (
     REQUEST_BODY,
     CursorText,
@@ -63,9 +64,9 @@ def get_controller_check(session: Reader, check_id: Id) -> ControllerCheck:
 
 
 @router.get("/{check_id}/figures/{name}")
-def get_controller_check_figure(session: Reader, check_id: Id, name: FigureName, theme: Theme = "light") -> FigureCard:
+def get_controller_check_figure(session: Reader, check_id: Id, name: FigureName, theme: Theme = "light") -> Card:
     """The signals of the reference model and the integrator, or the commands; recording and replica overlaid."""
-    return figure_card(service.figure(session, check_id, name, theme))
+    return service.figure(session, check_id, name, theme)
 
 
 @router.delete("/{check_id}", status_code=status.HTTP_204_NO_CONTENT)
