@@ -3247,7 +3247,7 @@ export type Reproduction = {
     /**
      * Rows
      */
-    rows: Array<ReproductionRow>;
+    rows: Array<Row>;
     /**
      * Notes
      */
@@ -3268,71 +3268,6 @@ export type ReproductionFigure = {
      * Title
      */
     title: string;
-};
-
-/**
- * ReproductionRow
- *
- * One number of a result.
- *
- * `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
- * this program. `overruled` is the reason for flying gains that the gate refuses.
- */
-export type ReproductionRow = {
-    /**
-     * Group
-     */
-    group: string;
-    /**
-     * Label
-     */
-    label: string;
-    /**
-     * Unit
-     */
-    unit: string;
-    /**
-     * Digits
-     */
-    digits: number;
-    /**
-     * Measured
-     */
-    measured: number;
-    /**
-     * Paper
-     */
-    paper: number | null;
-    /**
-     * Reference
-     */
-    reference: number | null;
-    /**
-     * Ratio
-     */
-    ratio: number | null;
-    /**
-     * Note
-     */
-    note: string;
-    /**
-     * Gains
-     */
-    gains: {
-        [key: string]: number | number;
-    };
-    /**
-     * Numbers
-     *
-     * further figures of the row, units in their names
-     */
-    numbers: {
-        [key: string]: number;
-    };
-    /**
-     * Overruled
-     */
-    overruled: string;
 };
 
 /**
@@ -3402,6 +3337,70 @@ export type Retune = {
      * Sentence
      */
     sentence: string;
+};
+
+/**
+ * Row
+ *
+ * One number of a result.
+ *
+ * `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
+ * this program, if it was measured or computed beforehand. None if there is no such number. `numbers` are further
+ * values of the row, by name including the unit; `overruled` is the reason for flying gains that the gate refuses.
+ */
+export type Row = {
+    /**
+     * Group
+     */
+    group: string;
+    /**
+     * Label
+     */
+    label: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Measured
+     */
+    measured: number;
+    /**
+     * Paper
+     */
+    paper: number | null;
+    /**
+     * Reference
+     */
+    reference: number | null;
+    /**
+     * Ratio
+     */
+    ratio: number | null;
+    /**
+     * Digits
+     */
+    digits: number;
+    /**
+     * Note
+     */
+    note: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Numbers
+     */
+    numbers: {
+        [key: string]: number;
+    };
+    /**
+     * Overruled
+     */
+    overruled: string;
 };
 
 /**
