@@ -65,7 +65,7 @@ def list_campaigns(
 @router.post("", status_code=status.HTTP_201_CREATED)
 def create_campaign(act: IdempotentPost, body: NewCampaign) -> Campaign:
     """Create a campaign; its first gains are then computed, and it becomes ready."""
-    return act(Campaign, lambda session: service.create_campaign(session, body))
+    return act(lambda session: service.create_campaign(session, body))
 
 
 @router.get("/{campaign_id}")
@@ -96,33 +96,33 @@ def finish_campaign(
 ) -> Campaign:
     """Finish a campaign between flights, on the operator's decision."""
     reason = (body or Finish()).reason
-    return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason, asking))
+    return act(lambda session: service.finish_campaign(session, campaign_id, reason, asking))
 
 
 @router.post("/{campaign_id}/archive")
 def archive_campaign(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id) -> Campaign:
     """Archive a finished campaign."""
-    return act(Campaign, lambda session: service.archive_campaign(session, campaign_id, asking))
+    return act(lambda session: service.archive_campaign(session, campaign_id, asking))
 
 
 @router.post("/{campaign_id}/clone", status_code=status.HTTP_201_CREATED)
 def clone_campaign(act: IdempotentPost, campaign_id: Id, body: Clone | None = None) -> Campaign:
     """Create a campaign with the same definition, linked to this one."""
-    return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
+    return act(lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
 
 
 @router.post("/{campaign_id}/rehearsal", status_code=status.HTTP_201_CREATED)
 def rehearse_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
     """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation. Created unless there is one
     that is under way or passed."""
-    return act(Campaign, lambda session: service.rehearse(session, campaign_id))
+    return act(lambda session: service.rehearse(session, campaign_id))
 
 
 @router.post("/{campaign_id}/promote")
 def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Promotion) -> Vehicle:
     """Make the best gains the safe gains of the campaign's registered vehicle, once its flights have shown that they
     are better than the first ones."""
-    return act(Vehicle, lambda session: service.promote_best(session, campaign_id, body, asking))
+    return act(lambda session: service.promote_best(session, campaign_id, body, asking))
 
 
 @router.get("/{campaign_id}/statistics")
@@ -140,7 +140,7 @@ def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
 @router.post("/{campaign_id}/proposal", status_code=status.HTTP_202_ACCEPTED)
 def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
     """Compute the proposal again."""
-    return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))
+    return act(lambda session: service.compute_proposal(session, campaign_id))
 
 
 @router.post("/{campaign_id}/prediction")

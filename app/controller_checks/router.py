@@ -48,14 +48,14 @@ def check_controller(
     (its .log as the form field `companion`), ArduCopter's .bin log, or a trace with a row for every step, .csv or
     .csv.gz. The recording itself is not kept."""
     result = service.check_upload(record.content(), name=record.name, companion=record.read_companion(), gains=gains)
-    return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
+    return record.once(lambda session: service.store_check(session, record.name, result))
 
 
 @router.post("/example", status_code=status.HTTP_201_CREATED)
 def check_example_controller(act: IdempotentPost) -> ControllerCheck:
     """Check the example recording: a takeoff that comes with Gainline, recorded from the autopilot's own code."""
     result = service.examine_example()
-    return act(ControllerCheck, lambda session: service.store_example(session, result))
+    return act(lambda session: service.store_example(session, result))
 
 
 @router.get("/{check_id}")

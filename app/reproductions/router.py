@@ -32,7 +32,7 @@ def get_reproduction(session: Reader, name: Name) -> Reproduction:
 @router.post("/{name}/run", status_code=status.HTTP_202_ACCEPTED)
 def run_reproduction(act: IdempotentPost, name: Name, body: Run | None = None) -> Job:
     """Request a run. If one is queued or running already, its job is returned."""
-    return act(Job, lambda session: service.request_run(session, name, full=(body or Run()).full))
+    return act(lambda session: service.request_run(session, name, full=(body or Run()).full))
 
 
 @router.get("/{name}/figures/{figure}")
