@@ -36,4 +36,4 @@ def bring_in_bundle(record: Record, settings: CurrentSettings) -> Campaign:
     history: it can be read, compared and cloned, but not flown."""
     with Bundle(record.file) as bundle:
         bundle.check()
-        return record.once(Campaign, lambda session: store_bundle(session, bundle, settings.data_dir))
+        return record.once(lambda session: store_bundle(session, bundle, settings.data_dir))

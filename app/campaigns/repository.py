@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
-from sqlalchemy import ColumnElement, Select, delete, func, or_, select, union_all
+from sqlalchemy import ColumnElement, Select, String, delete, func, or_, select, union_all
 from sqlalchemy.orm import Session, defer, joinedload
 
 from app.campaigns.schemas import Sort
@@ -109,7 +109,7 @@ ORDERS: Final[Mapping[Sort, Order]] = {
         (Sort.NEWEST, CampaignRow.id.expression),
         (Sort.OLDEST, CampaignRow.id.expression),
         (Sort.LATELY_CHANGED, CampaignRow.updated_at.expression),
-        (Sort.NAME, func.lower(CampaignRow.name)),
+        (Sort.NAME, func.lower(CampaignRow.name, type_=String())),
         (Sort.BEST_ERROR, func.coalesce(BEST_ERROR, _NO_ERROR)),
     )
 }

@@ -22,8 +22,9 @@ from app.campaigns.schemas import (
 from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.wear import VehicleCalibration
 from app.common.errors import InputError, Problem
-from app.common.schemas import FigureCard, Page, figure_card
+from app.common.schemas import Page
 from app.common.states import CampaignState
+from app.figures.base import Card
 from app.figures.data import Range
 from app.fleet import registration
 from app.fleet.schemas import Vehicle, VehicleEdit
@@ -64,7 +65,7 @@ def list_campaigns(
 @router.post("", status_code=status.HTTP_201_CREATED)
 def create_campaign(act: IdempotentPost, body: NewCampaign) -> Campaign:
     """Create a campaign; its first gains are then computed, and it becomes ready."""
-    return act(Campaign, lambda session: service.create_campaign(session, body))
+    return act(lambda session: service.create_campaign(session, body))
 
 
 @router.get("/{campaign_id}")
@@ -95,33 +96,33 @@ def finish_campaign(
 ) -> Campaign:
     """Finish a campaign between flights, on the operator's decision."""
     reason = (body or Finish()).reason
-    return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason, asking))
+    return act(lambda session: service.finish_campaign(session, campaign_id, reason, asking))
 
 
 @router.post("/{campaign_id}/archive")
 def archive_campaign(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id) -> Campaign:
     """Archive a finished campaign."""
-    return act(Campaign, lambda session: service.archive_campaign(session, campaign_id, asking))
+    return act(lambda session: service.archive_campaign(session, campaign_id, asking))
 
 
 @router.post("/{campaign_id}/clone", status_code=status.HTTP_201_CREATED)
 def clone_campaign(act: IdempotentPost, campaign_id: Id, body: Clone | None = None) -> Campaign:
     """Create a campaign with the same definition, linked to this one."""
-    return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
+    return act(lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
 
 
 @router.post("/{campaign_id}/rehearsal", status_code=status.HTTP_201_CREATED)
 def rehearse_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
     """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation. Created unless there is one
     that is under way or passed."""
-    return act(Campaign, lambda session: service.rehearse(session, campaign_id))
+    return act(lambda session: service.rehearse(session, campaign_id))
 
 
 @router.post("/{campaign_id}/promote")
 def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Promotion) -> Vehicle:
     """Make the best gains the safe gains of the campaign's registered vehicle, once its flights have shown that they
     are better than the first ones."""
-    return act(Vehicle, lambda session: service.promote_best(session, campaign_id, body, asking))
+    return act(lambda session: service.promote_best(session, campaign_id, body, asking))
 
 
 @router.get("/{campaign_id}/statistics")
@@ -139,7 +140,7 @@ def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
 @router.post("/{campaign_id}/proposal", status_code=status.HTTP_202_ACCEPTED)
 def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
     """Compute the proposal again."""
-    return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))
+    return act(lambda session: service.compute_proposal(session, campaign_id))
 
 
 @router.post("/{campaign_id}/prediction")
@@ -165,7 +166,7 @@ def get_landscape(
     campaign_id: Id,
     theme: Theme = "light",
     stacked: Annotated[bool, Query(description="one column of slices, for a narrow page")] = False,
-) -> FigureCard:
+) -> Card:
     """The gains as a path over the error that the strategy's model predicts, two gains at a time.
 
     A job computes it for each proposal, started at the first request by a client that may make changes; until it is
@@ -176,7 +177,7 @@ def get_landscape(
     if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
         with database.write() as session:
             landscapes.request_landscape(session, campaign_id)
-    return figure_card(asked.card)
+    return asked.card
 
 
 @figures_router.get("/campaigns/{campaign_id}/figures/{name}")
@@ -194,14 +195,14 @@ def get_campaign_figure(
         int | None,
         Query(ge=1, le=2**31, description="number of the flight whose prediction is drawn instead of the next one's"),
     ] = None,
-) -> FigureCard:
+) -> Card:
     """All takeoffs over the set point, the error of each flight, or the gains of each flight.
 
     With more than 30 flights the takeoffs are drawn as an envelope; the first, the best, the latest and that `flight`
     are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
     """
     view = figure_data.FigureView(window=_window(from_s, to_s), chosen=flight, predicted=predicted)
-    return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view))
+    return figure_data.campaign_figure(session, campaign_id, name, theme, view)
 
 
 def _window(from_s: float | None, to_s: float | None) -> Range | None:
@@ -218,9 +219,9 @@ def _window(from_s: float | None, to_s: float | None) -> Range | None:
 
 
 @figures_router.get("/trials/{trial_id}/figure")
-def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> FigureCard:
+def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> Card:
     """One flight, with its prediction and its commands."""
-    return figure_card(figure_data.flight_figure(session, trial_id, theme))
+    return figure_data.flight_figure(session, trial_id, theme)
 
 
 vehicles_router = APIRouter(prefix="/api/vehicles", tags=["vehicles"])
@@ -236,9 +237,9 @@ def get_calibration(session: Reader, vehicle_id: Id) -> VehicleCalibration:
 @vehicles_router.get("/{vehicle_id}/figures/{name}")
 def get_vehicle_figure(
     session: Reader, vehicle_id: Id, name: Literal["calibration", "batteries"], theme: Theme = "light"
-) -> FigureCard:
+) -> Card:
     """The fitted parameters over the vehicle's flights, or the battery voltages before and after each flight."""
-    return figure_card(wear.vehicle_figure(session, vehicle_id, name, theme))
+    return wear.vehicle_figure(session, vehicle_id, name, theme)
 
 
 @vehicles_router.patch("/{vehicle_id}", dependencies=[Depends(json_only)])

@@ -1,4 +1,4 @@
-"""What the schemas and pages of several slices share: checked names and numbers, pages and their cursors, figures.
+"""What the schemas and pages of several slices share: checked names and numbers, pages and their cursors.
 
 A name must not contain control characters: they can rewrite a terminal's lines, or reverse text so that one name looks
 like another. A cursor is the position where a page ended, so that the next page begins there whatever was added or
@@ -11,7 +11,7 @@ import json
 import unicodedata
 from datetime import datetime
 from pathlib import PurePath
-from typing import Annotated, Final, Generic, Literal, Self, TypeVar
+from typing import Annotated, Final, Generic, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
@@ -197,36 +197,3 @@ def _refused(reason: str) -> InputError:
         problems=(FieldProblem("cursor", reason),),
         hint="Start without a cursor, and send `next_cursor` unchanged.",
     )
-
-
-class FigureColumn(Schema):
-    """One column of a figure's table; `digits` after the decimal point, null for text."""
-
-    name: str
-    title: str
-    unit: str
-    digits: int | None
-
-
-class FigureTable(Schema):
-    """The figure's data as a table."""
-
-    columns: list[FigureColumn]
-    rows: list[list[str | int | float | None]]
-
-
-class FigureCard(Schema):
-    """A figure, or why there is none: `waiting` for data, or `failed`. `summary` describes it in a sentence."""
-
-    name: str
-    title: str
-    state: Literal["ready", "waiting", "failed"]
-    summary: str
-    reason: str
-    figure: Annotated[dict[str, object] | None, Field(description="Plotly's own JSON: data and layout")]
-    table: FigureTable | None
-
-
-def figure_card(card: object) -> FigureCard:
-    """Convert a card (`app.figures.base.Card`) to its API schema; raises ValidationError for another object."""
-    return FigureCard.model_validate(card, from_attributes=True)

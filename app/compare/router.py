@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.common.schemas import FigureCard, figure_card
 from app.compare import service
 from app.compare.schemas import FlightComparison
+from app.figures.base import Card
 from app.web.dependencies import Reader, Theme
 from app.web.downloads import described
 
@@ -28,9 +28,9 @@ def compare_flights(session: Reader, trial: TrialIds) -> FlightComparison:
 
 
 @router.get("/figure")
-def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "light") -> FigureCard:
+def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "light") -> Card:
     """Their curves over the set point, and below them the difference of each from the first."""
-    return figure_card(service.comparison_figure(session, trial, theme))
+    return service.comparison_figure(session, trial, theme)
 
 
 @router.get("/curves.csv", response_class=Response, responses=described("text/csv", binary=False))

@@ -5,9 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, status
 
 from app.autopilots.loop_check import FigureName
-from app.common.schemas import FigureCard, Page, figure_card
+from app.common.schemas import Page
 from app.controller_checks import service
 from app.controller_checks.service import ControllerCheck, ControllerCheckSummary
+from app.figures.base import Card
 from app.web.dependencies import (
     REQUEST_BODY,
     CursorText,
@@ -47,14 +48,14 @@ def check_controller(
     (its .log as the form field `companion`), ArduCopter's .bin log, or a trace with a row for every step, .csv or
     .csv.gz. The recording itself is not kept."""
     result = service.check_upload(record.content(), name=record.name, companion=record.read_companion(), gains=gains)
-    return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
+    return record.once(lambda session: service.store_check(session, record.name, result))
 
 
 @router.post("/example", status_code=status.HTTP_201_CREATED)
 def check_example_controller(act: IdempotentPost) -> ControllerCheck:
     """Check the example recording: a takeoff that comes with Gainline, recorded from the autopilot's own code."""
     result = service.examine_example()
-    return act(ControllerCheck, lambda session: service.store_example(session, result))
+    return act(lambda session: service.store_example(session, result))
 
 
 @router.get("/{check_id}")
@@ -63,9 +64,9 @@ def get_controller_check(session: Reader, check_id: Id) -> ControllerCheck:
 
 
 @router.get("/{check_id}/figures/{name}")
-def get_controller_check_figure(session: Reader, check_id: Id, name: FigureName, theme: Theme = "light") -> FigureCard:
+def get_controller_check_figure(session: Reader, check_id: Id, name: FigureName, theme: Theme = "light") -> Card:
     """The signals of the reference model and the integrator, or the commands; recording and replica overlaid."""
-    return figure_card(service.figure(session, check_id, name, theme))
+    return service.figure(session, check_id, name, theme)
 
 
 @router.delete("/{check_id}", status_code=status.HTTP_204_NO_CONTENT)

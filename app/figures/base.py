@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar, Final, Literal, Protocol
 
+from pydantic import with_config
+
 from app.figures.data import Curve
 
 Cell = str | int | float | None
@@ -42,9 +44,10 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
 
+@with_config(json_schema_serialization_defaults_required=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """A figure with its table and a one-sentence summary.
+    """A figure, in Plotly's own JSON, with its table and a one-sentence summary; the API sends it as it is.
 
     `waiting`: there is nothing to draw yet, `reason` says what is missing. `failed`: drawing failed, `reason` says how.
     """

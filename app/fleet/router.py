@@ -48,7 +48,7 @@ def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None)
 @router.post("", status_code=status.HTTP_201_CREATED)
 def register_vehicle(act: IdempotentPost, asking: RequestContextDep, body: NewVehicle) -> Vehicle:
     """Register a vehicle that Gainline keeps a link to. Whether it is REAL follows from its settings."""
-    return act(Vehicle, lambda session: registration.register_vehicle(session, body, asking))
+    return act(lambda session: registration.register_vehicle(session, body, asking))
 
 
 @router.get("/{vehicle_id}")
@@ -70,31 +70,31 @@ def delete_vehicle(
 @router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)
 def connect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Open the link and keep it open; the vehicle's safe gains are written and read back, unless it is armed."""
-    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.CONNECT, asking))
+    return act(lambda session: commands.request_act(session, vehicle_id, ActKind.CONNECT, asking))
 
 
 @router.post("/{vehicle_id}/disconnect", status_code=status.HTTP_202_ACCEPTED)
 def disconnect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Close the link."""
-    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.DISCONNECT, asking))
+    return act(lambda session: commands.request_act(session, vehicle_id, ActKind.DISCONNECT, asking))
 
 
 @router.post("/{vehicle_id}/check", status_code=status.HTTP_202_ACCEPTED)
 def check_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Run the preflight check."""
-    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.CHECK, asking))
+    return act(lambda session: commands.request_act(session, vehicle_id, ActKind.CHECK, asking))
 
 
 @router.post("/{vehicle_id}/restore", status_code=status.HTTP_202_ACCEPTED)
 def restore_safe_gains(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Write the safe gains and read them back."""
-    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.RESTORE, asking))
+    return act(lambda session: commands.request_act(session, vehicle_id, ActKind.RESTORE, asking))
 
 
 @router.post("/{vehicle_id}/parameters", status_code=status.HTTP_202_ACCEPTED)
 def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Read every parameter of the vehicle; they are in the act's result."""
-    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.PARAMETERS, asking))
+    return act(lambda session: commands.request_act(session, vehicle_id, ActKind.PARAMETERS, asking))
 
 
 @router.get("/{vehicle_id}/acts")
@@ -145,7 +145,7 @@ async def _order(
 def release_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id, body: Release) -> Vehicle:
     """Release a vehicle from quarantine, on the statement of a person who has inspected it. A vehicle with a link is
     released once the worker has verified that it is disarmed and holds its safe gains; the act reports the outcome."""
-    return act(Vehicle, lambda session: commands.release_vehicle(session, vehicle_id, body.statement, asking))
+    return act(lambda session: commands.release_vehicle(session, vehicle_id, body.statement, asking))
 
 
 @router.put("/{vehicle_id}/control")

@@ -18,7 +18,6 @@ def create_trial(
 ) -> Trial:
     """Plan a trial of the proposal, a variant or custom gains and, with `fly`, request its flight at once."""
     return act(
-        Trial,
         lambda session: service.plan_trial(session, campaign_id, body, asking, predict=predictor.predict),
         ahead=lambda session: predictor.prepare(session, campaign_id, body),
     )
@@ -29,7 +28,6 @@ def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body
     """Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
     for a real vehicle, which has to be staged."""
     return act(
-        Trial,
         lambda session: service.fly_trial(session, trial_id, body or FlightOrder(), asking),
         ahead=lambda session: service.warm_gate_cache(session, trial_id),
     )
@@ -39,7 +37,6 @@ def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body
 def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator."""
     return act(
-        Trial,
         lambda session: service.stage_trial(session, trial_id, asking),
         ahead=lambda session: service.warm_gate_cache(session, trial_id),
     )
@@ -48,14 +45,14 @@ def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) ->
 @router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
 def unstage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
-    return act(Trial, lambda session: service.unstage_trial(session, trial_id, asking))
+    return act(lambda session: service.unstage_trial(session, trial_id, asking))
 
 
 @router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
 def take_off_trial(act: IdempotentPost, asking: RequestContextDep, live: Live, trial_id: Id) -> Trial:
     """Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
     own page on this computer, with the token of the operator in control. Refused while the vehicle is not ready."""
-    return act(Trial, lambda session: service.take_off_trial(session, trial_id, asking, live.report))
+    return act(lambda session: service.take_off_trial(session, trial_id, asking, live.report))
 
 
 @router.get("/trials/{trial_id}/readiness")

@@ -39,10 +39,10 @@ def get_job_log(session: Reader, settings: CurrentSettings, job_id: Id, limit: L
 @router.post("/{job_id}/cancel")
 def cancel_job(act: IdempotentPost, job_id: Id) -> Job:
     """Cancel a job that is queued or running; what it has computed is discarded."""
-    return act(Job, lambda session: service.cancel_job(session, job_id))
+    return act(lambda session: service.cancel_job(session, job_id))
 
 
 @router.post("/{job_id}/retry")
 def retry_job(act: IdempotentPost, job_id: Id) -> Job:
     """Queue a failed or cancelled job again."""
-    return act(Job, lambda session: service.retry_job(session, job_id))
+    return act(lambda session: service.retry_job(session, job_id))

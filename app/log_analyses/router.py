@@ -37,6 +37,5 @@ def start_campaign(record: Record, asking: RequestContextDep, vehicle: VehicleId
 
     found = service.read_upload(record.content(), record.read_companion(), name=record.name)
     return record.once(
-        Campaign,
-        lambda session: campaigns.start_campaign(session, found, asking, name=record.name, vehicle_id=vehicle),
+        lambda session: campaigns.start_campaign(session, found, asking, name=record.name, vehicle_id=vehicle)
     )

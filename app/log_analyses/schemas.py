@@ -5,7 +5,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from app.common.schemas import FigureCard, Gains, Schema
+from app.common.schemas import Gains, Schema
+from app.figures.base import Card
 from app.figures.theme import ThemeName
 
 
@@ -160,4 +161,4 @@ class LogAnswer(Schema):
 class LogAnalysis(LogAnswer):
     """The result of a log analysis."""
 
-    figures: Annotated[dict[ThemeName, FigureCard], Field(description="by theme")]
+    figures: Annotated[dict[ThemeName, Card], Field(description="by theme")]

@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, get_args
 
-from app.common.schemas import figure_card
 from app.figures.base import card_of
 from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
@@ -22,7 +21,7 @@ def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> Log
     from app.log_analyses.content import analyze_content  # noqa: PLC0415 - imports every reader and model
 
     answer, plot = run_limited(FILE, analyze_content, content, companion, name)
-    figures = {theme: figure_card(card_of(PanelsFigure(plot, theme))) for theme in get_args(ThemeName)}
+    figures = {theme: card_of(PanelsFigure(plot, theme)) for theme in get_args(ThemeName)}
     return LogAnalysis(**dict(answer), figures=figures)
 
 

@@ -39,7 +39,7 @@ class Row:
     ratio: float | None = None
     digits: int = 4
     note: str = ""
-    gains: Mapping[str, float] = field(default_factory=dict)
+    gains: Mapping[str, int | float] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
     overruled: str = ""
 

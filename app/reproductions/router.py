@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, status
 
-from app.common.schemas import FigureCard, Page, figure_card
+from app.common.schemas import Page
+from app.figures.base import Card
 from app.jobs.service import Job
 from app.reproductions import service
 from app.reproductions.schemas import Reproduction, ReproductionSummary, Run
@@ -31,10 +32,10 @@ def get_reproduction(session: Reader, name: Name) -> Reproduction:
 @router.post("/{name}/run", status_code=status.HTTP_202_ACCEPTED)
 def run_reproduction(act: IdempotentPost, name: Name, body: Run | None = None) -> Job:
     """Request a run. If one is queued or running already, its job is returned."""
-    return act(Job, lambda session: service.request_run(session, name, full=(body or Run()).full))
+    return act(lambda session: service.request_run(session, name, full=(body or Run()).full))
 
 
 @router.get("/{name}/figures/{figure}")
-def get_reproduction_figure(session: Reader, name: Name, figure: Name, theme: Theme = "light") -> FigureCard:
+def get_reproduction_figure(session: Reader, name: Name, figure: Name, theme: Theme = "light") -> Card:
     """A figure of the newest result."""
-    return figure_card(service.figure(session, name, figure, theme))
+    return service.figure(session, name, figure, theme)

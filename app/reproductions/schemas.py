@@ -5,8 +5,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from app.common.schemas import Gains, Request, Schema
+from app.common.schemas import Request, Schema
 from app.jobs.service import Job
+from app.reproductions.results import Row
 
 
 class Run(Request):
@@ -47,29 +48,8 @@ class ReproductionSummary(Schema):
     latest: LatestRun | None
 
 
-class ReproductionRow(Schema):
-    """One number of a result.
-
-    `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
-    this program. `overruled` is the reason for flying gains that the gate refuses.
-    """
-
-    group: str
-    label: str
-    unit: str
-    digits: int
-    measured: float
-    paper: float | None
-    reference: float | None
-    ratio: float | None
-    note: str
-    gains: Gains
-    numbers: Annotated[dict[str, float], Field(description="further figures of the row, units in their names")]
-    overruled: str
-
-
 class Reproduction(ReproductionSummary):
     """A reproduction with the rows of its newest result, empty before the first."""
 
-    rows: list[ReproductionRow]
+    rows: list[Row]
     notes: list[str]

@@ -101,15 +101,15 @@ Writer = Annotated[Session, Depends(_writer, scope="function")]
 
 @dataclass(frozen=True, slots=True)
 class IdempotentRequest:
-    """Carries out a POST in one transaction, and only once for requests with the same idempotency key."""
+    """Carries out a POST in one transaction, and only once for requests with the same idempotency key. `answer` is the
+    model of the route's answers."""
 
     database: Database
     key: str | None
     fingerprint: str
+    answer: type[Any]
 
-    def __call__(
-        self, answer: type[M], work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None
-    ) -> M:
+    def __call__(self, work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None) -> M:
         """Return the result of `work`, or its stored result of the first time. Raises KeyReusedError for another
         request.
 
@@ -121,16 +121,18 @@ class IdempotentRequest:
         with self.database.write() as session:
             if self.key is None:
                 return work(session)
-            return carry_out_once(session, self.key, self.fingerprint, answer, work)
+            answer: M = carry_out_once(session, self.key, self.fingerprint, self.answer, work)
+            return answer
 
 
-def fingerprint(request: Request, body_digest: str) -> str:
-    """Fingerprint of a request; two requests are the same if method, path and body are."""
-    return hashlib.sha256(f"{request.method} {request.url.path} {body_digest}".encode()).hexdigest()
+def _idempotent(request: Request, database: Database, key: str | None, body_digest: str) -> IdempotentRequest:
+    """Two requests are the same if method, path and body are."""
+    fingerprint = hashlib.sha256(f"{request.method} {request.url.path} {body_digest}".encode()).hexdigest()
+    return IdempotentRequest(database, key, fingerprint, request.scope["route"].response_model)
 
 
 async def _once(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> IdempotentRequest:
-    return IdempotentRequest(database, key, fingerprint(request, hashlib.sha256(await request.body()).hexdigest()))
+    return _idempotent(request, database, key, hashlib.sha256(await request.body()).hexdigest())
 
 
 IdempotentPost = Annotated[IdempotentRequest, Depends(_once)]
@@ -236,7 +238,7 @@ async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyK
             hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
         )
     async with arriving(request) as (file, name, companion, fields, digest):
-        once = IdempotentRequest(database, key, fingerprint(request, f"{request.url.query} {digest}"))
+        once = _idempotent(request, database, key, f"{request.url.query} {digest}")
         yield Upload(file, name, companion, fields, once)
 
 

@@ -70,10 +70,7 @@ def reopen_campaign(
 ) -> Campaign:
     """Reopen a finished campaign for more flights."""
     asked = body or Reopening()
-    return act(
-        Campaign,
-        lambda session: service.reopen_campaign(session, campaign_id, asked, asking, predict=predictor.predict),
-    )
+    return act(lambda session: service.reopen_campaign(session, campaign_id, asked, asking, predict=predictor.predict))
 
 
 @router.get("/trials/{trial_id}")
@@ -90,20 +87,20 @@ def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
 @router.post("/trials/{trial_id}/cancel")
 def cancel_trial(act: IdempotentPost, trial_id: Id) -> Trial:
     """Cancel a trial that has not flown."""
-    return act(Trial, lambda session: service.cancel_trial(session, trial_id))
+    return act(lambda session: service.cancel_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/classify")
 def classify_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: Classification) -> Trial:
     """Classify a finished flight as valid, aborted or invalid; whatever was computed from it is recomputed."""
-    return act(Trial, lambda session: reviews.classify_trial(session, trial_id, body, asking))
+    return act(lambda session: reviews.classify_trial(session, trial_id, body, asking))
 
 
 @router.post("/trials/{trial_id}/judge-abort")
 def judge_abort(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: AbortJudgement) -> Trial:
     """Record why the operator aborted a flight. It counts against its gains only if the vehicle behaved badly; whatever
     was computed from it is recomputed."""
-    return act(Trial, lambda session: reviews.judge_abort(session, trial_id, body, asking))
+    return act(lambda session: reviews.judge_abort(session, trial_id, body, asking))
 
 
 @router.get("/trials/{trial_id}/trajectory")
@@ -195,7 +192,6 @@ def import_flight(
     plan = record.read_field("trial", TrialPlan)
     flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(
-        Trial,
         lambda session: records.plan_and_import(
             session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid, predict=predictor.predict
         ),
@@ -220,8 +216,7 @@ def upload_trajectory(
     """
     flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(
-        Trial,
-        lambda session: records.import_record(session, trial_id, flown, asking, confirmed=confirm, invalid=invalid),
+        lambda session: records.import_record(session, trial_id, flown, asking, confirmed=confirm, invalid=invalid)
     )
 
 
@@ -231,4 +226,4 @@ def add_photo(upload: Record, trial_id: Id) -> TrialPhoto:
     `file`."""
     upload.file.seek(0)
     content = upload.file.read(photos.MAX_BYTES + 1)
-    return upload.once(TrialPhoto, lambda session: photos.add_photo(session, trial_id, content))
+    return upload.once(lambda session: photos.add_photo(session, trial_id, content))

@@ -15,7 +15,7 @@ import {
 } from "./generated";
 import type { Theme } from "./queries";
 
-export type { Job, JobState, LogLine, ReproductionRow, ReproductionSummary } from "./generated";
+export type { Job, JobState, LogLine, ReproductionSummary, Row as ReproductionRow } from "./generated";
 
 export const JOBS_PAGE = 20;
 

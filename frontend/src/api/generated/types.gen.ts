@@ -521,6 +521,43 @@ export type CampaignVehicle = {
 };
 
 /**
+ * Card
+ *
+ * A figure, in Plotly's own JSON, with its table and a one-sentence summary; the API sends it as it is.
+ *
+ * `waiting`: there is nothing to draw yet, `reason` says what is missing. `failed`: drawing failed, `reason` says how.
+ */
+export type Card = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * State
+     */
+    state: 'ready' | 'waiting' | 'failed';
+    /**
+     * Summary
+     */
+    summary: string;
+    /**
+     * Reason
+     */
+    reason: string;
+    /**
+     * Figure
+     */
+    figure: {
+        [key: string]: unknown;
+    } | null;
+    table: Table | null;
+};
+
+/**
  * Catalogue
  */
 export type Catalogue = {
@@ -675,6 +712,33 @@ export type Clone = {
      * Warm Start
      */
     warm_start?: boolean;
+};
+
+/**
+ * Column
+ *
+ * One column of a data table.
+ *
+ * `digits` is the number of decimals, None for text and for numbers of any size, which are shown with four significant
+ * digits.
+ */
+export type Column = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Digits
+     */
+    digits: number | null;
 };
 
 /**
@@ -1312,83 +1376,6 @@ export type Explanation = {
  * Failures by their numbers in docs/real-flight.md.
  */
 export type Failure = 'F1' | 'F2' | 'F3' | 'F4a' | 'F4b' | 'F5' | 'F6' | 'F7' | 'F8' | 'F9a' | 'F9b' | 'F9c' | 'F9d' | 'F9e' | 'F10a' | 'F10b' | 'F10c' | 'F11' | 'F12' | 'F13' | 'F14a' | 'F14b' | 'F14c';
-
-/**
- * FigureCard
- *
- * A figure, or why there is none: `waiting` for data, or `failed`. `summary` describes it in a sentence.
- */
-export type FigureCard = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Title
-     */
-    title: string;
-    /**
-     * State
-     */
-    state: 'ready' | 'waiting' | 'failed';
-    /**
-     * Summary
-     */
-    summary: string;
-    /**
-     * Reason
-     */
-    reason: string;
-    /**
-     * Figure
-     *
-     * Plotly's own JSON: data and layout
-     */
-    figure: {
-        [key: string]: unknown;
-    } | null;
-    table: FigureTable | null;
-};
-
-/**
- * FigureColumn
- *
- * One column of a figure's table; `digits` after the decimal point, null for text.
- */
-export type FigureColumn = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Title
-     */
-    title: string;
-    /**
-     * Unit
-     */
-    unit: string;
-    /**
-     * Digits
-     */
-    digits: number | null;
-};
-
-/**
- * FigureTable
- *
- * The figure's data as a table.
- */
-export type FigureTable = {
-    /**
-     * Columns
-     */
-    columns: Array<FigureColumn>;
-    /**
-     * Rows
-     */
-    rows: Array<Array<string | number | number | null>>;
-};
 
 /**
  * Finish
@@ -2485,7 +2472,7 @@ export type LogAnalysis = {
      * by theme
      */
     figures: {
-        [key: string]: FigureCard;
+        [key: string]: Card;
     };
 };
 
@@ -3274,7 +3261,7 @@ export type Reproduction = {
     /**
      * Rows
      */
-    rows: Array<ReproductionRow>;
+    rows: Array<Row>;
     /**
      * Notes
      */
@@ -3295,71 +3282,6 @@ export type ReproductionFigure = {
      * Title
      */
     title: string;
-};
-
-/**
- * ReproductionRow
- *
- * One number of a result.
- *
- * `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
- * this program. `overruled` is the reason for flying gains that the gate refuses.
- */
-export type ReproductionRow = {
-    /**
-     * Group
-     */
-    group: string;
-    /**
-     * Label
-     */
-    label: string;
-    /**
-     * Unit
-     */
-    unit: string;
-    /**
-     * Digits
-     */
-    digits: number;
-    /**
-     * Measured
-     */
-    measured: number;
-    /**
-     * Paper
-     */
-    paper: number | null;
-    /**
-     * Reference
-     */
-    reference: number | null;
-    /**
-     * Ratio
-     */
-    ratio: number | null;
-    /**
-     * Note
-     */
-    note: string;
-    /**
-     * Gains
-     */
-    gains: {
-        [key: string]: number | number;
-    };
-    /**
-     * Numbers
-     *
-     * further figures of the row, units in their names
-     */
-    numbers: {
-        [key: string]: number;
-    };
-    /**
-     * Overruled
-     */
-    overruled: string;
 };
 
 /**
@@ -3429,6 +3351,70 @@ export type Retune = {
      * Sentence
      */
     sentence: string;
+};
+
+/**
+ * Row
+ *
+ * One number of a result.
+ *
+ * `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
+ * this program, if it was measured or computed beforehand. None if there is no such number. `numbers` are further
+ * values of the row, by name including the unit; `overruled` is the reason for flying gains that the gate refuses.
+ */
+export type Row = {
+    /**
+     * Group
+     */
+    group: string;
+    /**
+     * Label
+     */
+    label: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Measured
+     */
+    measured: number;
+    /**
+     * Paper
+     */
+    paper: number | null;
+    /**
+     * Reference
+     */
+    reference: number | null;
+    /**
+     * Ratio
+     */
+    ratio: number | null;
+    /**
+     * Digits
+     */
+    digits: number;
+    /**
+     * Note
+     */
+    note: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Numbers
+     */
+    numbers: {
+        [key: string]: number;
+    };
+    /**
+     * Overruled
+     */
+    overruled: string;
 };
 
 /**
@@ -3758,6 +3744,22 @@ export type System = {
      * Database Revision
      */
     database_revision: string;
+};
+
+/**
+ * Table
+ *
+ * The data of the figure as a table, for those who cannot see it or want the numbers.
+ */
+export type Table = {
+    /**
+     * Columns
+     */
+    columns: Array<Column>;
+    /**
+     * Rows
+     */
+    rows: Array<Array<string | number | number | null>>;
 };
 
 /**
@@ -7406,7 +7408,7 @@ export type GetReproductionFigureResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetReproductionFigureResponse = GetReproductionFigureResponses[keyof GetReproductionFigureResponses];
@@ -7624,7 +7626,7 @@ export type GetControllerCheckFigureResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetControllerCheckFigureResponse = GetControllerCheckFigureResponses[keyof GetControllerCheckFigureResponses];
@@ -7783,7 +7785,7 @@ export type GetComparisonFigureResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetComparisonFigureResponse = GetComparisonFigureResponses[keyof GetComparisonFigureResponses];
@@ -8011,7 +8013,7 @@ export type GetVehicleFigureResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetVehicleFigureResponse = GetVehicleFigureResponses[keyof GetVehicleFigureResponses];
@@ -8062,7 +8064,7 @@ export type GetLandscapeResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetLandscapeResponse = GetLandscapeResponses[keyof GetLandscapeResponses];
@@ -8127,7 +8129,7 @@ export type GetCampaignFigureResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetCampaignFigureResponse = GetCampaignFigureResponses[keyof GetCampaignFigureResponses];
@@ -8164,7 +8166,7 @@ export type GetFlightFigureResponses = {
     /**
      * Successful Response
      */
-    200: FigureCard;
+    200: Card;
 };
 
 export type GetFlightFigureResponse = GetFlightFigureResponses[keyof GetFlightFigureResponses];
