@@ -10,7 +10,7 @@ from app.figures import theme
 from app.figures.base import Card, Table, Trace, literal, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, Scored
 from app.figures.overlays import off_scale
-from app.figures.scale import robust_span, thin_by_bends, thinned
+from app.figures.scale import span_around, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 600
@@ -60,7 +60,7 @@ class ComparisonFigure:
 
     def compute(self) -> Card:
         palette, recorded = PALETTES[self.theme], self._recorded()
-        low, high, outside = self._span([curve for _, _, curve in recorded])
+        low, high, outside = span_around(self.data.set_point.values, [curve.values for *_, curve in recorded])
         traces = [self._set_point(palette)]
         traces += [self._flight(palette, index, flight, curve) for index, flight, curve in recorded]
         traces += [
@@ -85,13 +85,6 @@ class ComparisonFigure:
         if first is None or len(first.time_s) == 0:
             return []
         return [(index, flight, _less(curve, first)) for index, flight, curve in recorded if index > 0]
-
-    def _span(self, curves: list[Curve]) -> tuple[float, float, tuple[int, ...]]:
-        goal = self.data.set_point.values
-        low, high = min(0.0, float(goal.min())), max(0.0, float(goal.max()))
-        if low == high:
-            low, high = min(low, float(curves[0].values.min())), max(high, float(curves[0].values.max()))
-        return robust_span([curve.values for curve in curves], low=low, high=high)
 
     def _layout(self, palette: Palette, low: float, high: float) -> dict[str, object]:
         data, end = self.data, float(self.data.set_point.time_s[-1])

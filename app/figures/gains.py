@@ -98,20 +98,18 @@ class GainsFigure:
         return [*drawn, following]
 
     def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
-        count, suffix = len(self.history.gains), theme.suffix(index)
+        count = len(self.history.gains)
         values = [flight.gains[gain.name] for flight in self.history.flights]
         if self.history.proposal is not None:
             values.append(self.history.proposal.gains[gain.name])
-        return {
-            f"xaxis{suffix}": theme.shared_axis(palette, "Flight", index, count, **theme.flight_ticks(last)),
-            f"yaxis{suffix}": theme.axis(
-                palette,
-                domain=theme.stacked(index, count, GAP),
-                anchor=f"x{suffix}",
-                range=padded(min(values), max(values), gain),
-                nticks=4 if count <= 3 else 3,
-            ),
-        }
+        return theme.panel_axes(
+            palette,
+            (index, count, GAP),
+            "Flight",
+            theme.flight_ticks(last),
+            range=padded(min(values), max(values), gain),
+            nticks=4 if count <= 3 else 3,
+        )
 
     def _names(self, palette: Palette) -> list[dict[str, object]]:
         """Name, title and unit of each gain, above its panel; where one would not fit, the titles show under the

@@ -110,16 +110,12 @@ class PanelsFigure:
         return trace | theme.on(number) | drawn
 
     def _axes(self, palette: Palette, number: int, panel: Panel) -> dict[str, object]:
-        count, suffix = len(self.plot.panels), theme.suffix(number)
+        count = len(self.plot.panels)
         x = {} if self.plot.x_range is None else {"range": list(self.plot.x_range)}
         y = {} if panel.y_range is None else {"range": list(panel.y_range)}
-        place = theme.stacked(number, count, GAP)
-        return {
-            f"xaxis{suffix}": theme.shared_axis(palette, self.plot.x_title, number, count, **x),
-            f"yaxis{suffix}": theme.axis(
-                palette, panel.y_title, anchor=f"x{suffix}", domain=place, nticks=7 if count == 1 else 4, **y
-            ),
-        }
+        ticks = 7 if count == 1 else 4
+        place = (number, count, GAP)
+        return theme.panel_axes(palette, place, self.plot.x_title, x, panel.y_title, nticks=ticks, **y)
 
     def _table(self) -> Table:
         several = len(self.plot.panels) > 1

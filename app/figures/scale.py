@@ -41,13 +41,25 @@ def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: flo
     return RobustRange(low=low - pad, high=top + pad, outside=outside)
 
 
-def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> tuple[float, float, tuple[int, ...]]:
+RobustSpan = tuple[float, float, tuple[int, ...]]
+
+
+def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> RobustSpan:
     """A two-sided range for whole curves: low, high, and the curves that leave it on either side."""
     if not curves:
         curves = [np.array([low, high])]
     up = robust_range([float(values.max()) for values in curves], low=low, high=high)
     down = robust_range([-float(values.min()) for values in curves], low=-high, high=-low)
     return -down.high, up.high, tuple(sorted({*up.outside, *down.outside}))
+
+
+def span_around(goal: Samples, curves: Sequence[Samples], *, headroom: float = 1.0) -> RobustSpan:
+    """The range from the ground to the goal, with room above it, and of the curves around it; if the goal is zero, that
+    of the first curve."""
+    low, high = min(0.0, float(goal.min())), headroom * max(0.0, float(goal.max()))
+    if low == high and curves:
+        low, high = min(low, float(curves[0].min())), max(high, float(curves[0].max()))
+    return robust_span(curves, low=low, high=high)
 
 
 def thinned(

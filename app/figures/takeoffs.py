@@ -30,7 +30,7 @@ from app.figures.overlays import (
     part_off_scale,
     select_individual_flights,
 )
-from app.figures.scale import robust_span, thin_by_bends, thinned
+from app.figures.scale import RobustSpan, span_around, thin_by_bends, thinned
 from app.figures.standings import SHARED_LEGEND, drawing_order, standing_of, style_of
 from app.figures.theme import PALETTES, Palette, ThemeName
 
@@ -226,16 +226,12 @@ class TrajectoriesFigure:
         curves = [one.curve for one in shown if one is not None and one.curve is not None]
         return deviation_limit(curves, history.target)
 
-    def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
+    def _span(self, drawn: list[FlightData]) -> RobustSpan:
         """From the ground to above the set point; if the set point is zero, the range of the first flight."""
         curves = [flight.curve.values for flight in drawn if flight.curve is not None]
         if self.history.proposal is not None and self.history.proposal.curve is not None:
             curves.append(self.history.proposal.curve.values)
-        goal = self.history.set_point.values
-        low, high = min(0.0, float(goal.min())), HEADROOM * max(0.0, float(goal.max()))
-        if low == high and curves:
-            low, high = min(low, float(curves[0].min())), max(high, float(curves[0].max()))
-        return robust_span(curves, low=low, high=high)
+        return span_around(self.history.set_point.values, curves, headroom=HEADROOM)
 
     def _flight(self, palette: Palette, flight: FlightData, points: int) -> Trace:
         assert flight.curve is not None

@@ -148,12 +148,24 @@ def stacked(index: int, count: int, gap: float) -> list[float]:
     return [max(0.0, top - height), top]
 
 
-def shared_axis(palette: Palette, title: str, index: int, count: int, **more: object) -> dict[str, object]:
-    """The abscissa of one of `count` stacked panels: only the lowest has labels, the others follow the first."""
-    own = {"showticklabels": index == count, "anchor": f"y{suffix(index)}", **more}
-    if index > 1:
-        own["matches"] = "x"
-    return axis(palette, title if index == count else "", **own)
+def panel_axes(
+    palette: Palette,
+    place: tuple[int, int, float],
+    x_title: str,
+    x: Mapping[str, object],
+    y_title: str = "",
+    **y: object,
+) -> dict[str, object]:
+    """The axes of one of stacked panels, at the `place` that `stacked` takes. Of the abscissae only the lowest has
+    labels, and the others follow the first."""
+    index, count, _ = place
+    own, is_lowest = suffix(index), index == count
+    follows = {"matches": "x"} if index > 1 else {}
+    across = {"showticklabels": is_lowest, "anchor": f"y{own}", **x, **follows}
+    return {
+        f"xaxis{own}": axis(palette, x_title if is_lowest else "", **across),
+        f"yaxis{own}": axis(palette, y_title, domain=stacked(*place), anchor=f"x{own}", **y),
+    }
 
 
 def flight_ticks(last: int) -> dict[str, object]:

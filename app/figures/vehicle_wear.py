@@ -49,15 +49,21 @@ class CalibrationFigure:
     def compute(self) -> Card:
         palette = PALETTES[self.theme]
         names = [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
+        first = {name: next(point.fitted[name] for point in self.points if name in point.fitted) for name in names}
+        ticks = theme.flight_ticks(max(point.flight for point in self.points))
         axes: dict[str, object] = {}
-        for index in range(1, len(names) + 1):
-            axes |= self._axes(palette, index, len(names))
+        titles = []
+        for index, fitted in enumerate(first.values(), start=1):
+            place, unit = (index, len(names), _GAP), f" ({fitted.unit})" if fitted.unit else ""
+            title = f"<b>{fitted.title}</b>{unit}"
+            axes |= theme.panel_axes(palette, place, "Flight of this vehicle", ticks, nticks=4, rangemode="normal")
+            titles.append(theme.note(palette, title, y=theme.stacked(*place)[1]))
         layout = theme.layout(
             palette,
             showlegend=False,
             uirevision="calibration",
             margin={**theme.MARGIN_PX, "t": 24, "r": 30},
-            annotations=[self._title(palette, index, name, len(names)) for index, name in enumerate(names, start=1)],
+            annotations=titles,
             shapes=self._tuned(palette, len(names)),
             **axes,
         )
@@ -66,7 +72,7 @@ class CalibrationFigure:
             [self._panel(palette, index, name) for index, name in enumerate(names, start=1)],
             layout,
             summary=f"Bars are 95 % intervals. {self.verdict}",
-            table=self._table(names),
+            table=self._table(first),
         )
 
     def _panel(self, palette: Palette, index: int, name: str) -> Trace:
@@ -92,19 +98,6 @@ class CalibrationFigure:
             f"{first.unit}<extra></extra>",
         )
 
-    def _axes(self, palette: Palette, index: int, panels: int) -> dict[str, object]:
-        suffix, ticks = theme.suffix(index), theme.flight_ticks(max(point.flight for point in self.points))
-        place = theme.stacked(index, panels, _GAP)
-        return {
-            f"xaxis{suffix}": theme.shared_axis(palette, "Flight of this vehicle", index, panels, **ticks),
-            f"yaxis{suffix}": theme.axis(palette, domain=place, anchor=f"x{suffix}", nticks=4, rangemode="normal"),
-        }
-
-    def _title(self, palette: Palette, index: int, name: str, panels: int) -> dict[str, object]:
-        fitted = next(point.fitted[name] for point in self.points if name in point.fitted)
-        place = theme.stacked(index, panels, _GAP)
-        return theme.note(palette, f"<b>{fitted.title}</b>{f' ({fitted.unit})' if fitted.unit else ''}", y=place[1])
-
     def _tuned(self, palette: Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
@@ -114,17 +107,16 @@ class CalibrationFigure:
             for suffix in suffixes
         ]
 
-    def _table(self, names: list[str]) -> Table:
-        first = {name: next(point.fitted[name] for point in self.points if name in point.fitted) for name in names}
+    def _table(self, first: Mapping[str, Fitted]) -> Table:
         columns = [Column("flight", "Flight of the vehicle", digits=0), Column("campaign", "Campaign", digits=0)]
         columns.append(Column("trial", "Its flight", digits=0))
-        for name in names:
-            columns.append(Column(name, first[name].title, first[name].unit))
-            columns.append(Column(f"{name}_se", "Standard error", first[name].unit))
+        for name, one in first.items():
+            columns.append(Column(name, one.title, one.unit))
+            columns.append(Column(f"{name}_se", "Standard error", one.unit))
         rows: list[tuple[Cell, ...]] = []
         for point in self.points:
             cells: list[Cell] = [point.flight, point.campaign_id, point.trial_number]
-            for name in names:
+            for name in first:
                 fitted = point.fitted.get(name)
                 cells += [None, None] if fitted is None else [fitted.value, fitted.standard_error]
             rows.append(tuple(cells))

@@ -144,9 +144,7 @@ def fly_campaign(title: str, published: tuple[Run, ...], fly: Callable[[Gains], 
             break
         gains, spread = proposal.gains, proposal.spread
         require_flyable(check_policy(definition, _TAKEOFF, _TAKEOFF.space, gains, flights, start=gains, spread=spread))
-        record = fly(gains).as_stored()
-        error = _TAKEOFF.error(record)
-        flights.append(Flight(number=len(flights) + 1, gains=gains, trajectory=record, error=error, outcome="valid"))
+        flights.append(_TAKEOFF.scored_flight(len(flights) + 1, gains, fly(gains).as_stored()))
     runs = runs_of((tuple(flight.gains.values()), flight.error or 0.0) for flight in flights)
     return Campaign(title, runs, published, verdict.reason)
 

@@ -231,8 +231,7 @@ def _flown(definition: Definition, method: Method, *, until_near: bool) -> Itera
         number = len(flights) + 1
         seed = flight_seed(definition.seed, number)
         record = whole_flight(proposal.gains, log_noise=method.log_noise, seed=seed).as_stored()
-        error = truth().error(record)
-        flights.append(Flight(number=number, gains=proposal.gains, trajectory=record, error=error, outcome="valid"))
+        flights.append(truth().scored_flight(number, proposal.gains, record))
         yield flights[-1]
         if until_near and _true_errors([proposal.gains])[0] <= (1.0 + WITHIN) * BEST_ERROR:
             return

@@ -12,7 +12,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.definition import Option, OptionValue
+from app.core.definition import Flight, Option, OptionValue
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -267,6 +267,11 @@ class Experiment(ABC):
     def set_point(self, time_s: Samples) -> Samples:
         """Set point of the scored output, same shape as `time_s`; zero before the command, and without set points."""
         return np.zeros_like(time_s) if self.set_points is None else self.set_points.at(time_s)
+
+    def scored_flight(self, number: int, gains: Gains, trajectory: Trajectory) -> Flight:
+        """A valid flight with this record. Raises TrajectoryError if it cannot be scored."""
+        error = self.error(trajectory)
+        return Flight(number=number, gains=gains, trajectory=trajectory, error=error, outcome="valid")
 
     @abstractmethod
     def errors(self, outputs: Matrix) -> Vector:

@@ -11,7 +11,7 @@ import numpy as np
 from app.core.control.vertical_guidance import RATE_HZ
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment, Matrix, ModelParameter, Scatter
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
+from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts, grid_of
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
@@ -63,7 +63,25 @@ class Sketches:
     lowest_m: Matrix
 
 
-class Takeoff(VerticalLoop):
+class TakeoffManoeuvre(Experiment):
+    """The paper's takeoff, scored over the first `window_s` from the command on."""
+
+    options = OPTIONS
+    output = "altitude_m"
+    error_unit = "m"
+    measure = "a takeoff to 3 m"
+
+    def errors(self, outputs: Matrix) -> Vector:
+        """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
+        return mean_absolute_errors(self.grid_s, outputs, self.set_point, 0.0, self.window_s)
+
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
+        """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
+        require_scorable(trajectory, self.output, 0.0, self.window_s, accept_gaps=accept_gaps)
+        return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, self.window_s)
+
+
+class Takeoff(TakeoffManoeuvre, VerticalLoop):
     """Takeoff with the paper's autopilot, scored over the first `window_s` from the command on.
 
     A run has 16693 samples in the default window.
@@ -71,8 +89,6 @@ class Takeoff(VerticalLoop):
 
     name = "takeoff"
     title = "Takeoff to 3 m"
-    measure = "a takeoff to 3 m"
-    options = OPTIONS
     sketches_s: Final = (8.0, 12.0)
     """Times until which the robust optimum simulates: a coarse look, then a finer one."""
     expected_m: Final = (TARGET_M - 0.6, TARGET_M + 0.6)
@@ -113,57 +129,34 @@ class Takeoff(VerticalLoop):
         end = deviations[:, -round(_SKETCH_END_S * rate_hz) :].mean(axis=1) * (self.window_s - until_s)
         return np.asarray((deviations.sum(axis=1) / rate_hz + end) / self.window_s)
 
-    def errors(self, outputs: Matrix) -> Vector:
-        """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
-        return mean_absolute_errors(self.grid_s, outputs, self.set_point, 0.0, self.window_s)
-
-    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
-        require_scorable(trajectory, self.output, 0.0, self.window_s, accept_gaps=accept_gaps)
-        return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, self.window_s)
-
-
-_PAPER: Final = Takeoff()
-
 
 def copter_gain(name: str, title: str, unit: str, lower: float, upper: float, default: float) -> Gain:
     """A gain of another autopilot."""
     return Gain(name, title, unit, lower=lower, upper=upper, scale=upper / 10, default=default, integer=False)
 
 
-class CopterTakeoff(Experiment):
+class CopterTakeoff(TakeoffManoeuvre):
     """The paper's takeoff, manoeuvre and score, with the gains of another autopilot."""
 
-    options = OPTIONS
-    output = _PAPER.output
-    error_unit = _PAPER.error_unit
-    measure = _PAPER.measure
-    set_points = _PAPER.set_points
+    set_points = SET_POINTS
 
-    def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...], *, paper: Takeoff = _PAPER) -> None:
+    def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...], *, window_s: float = WINDOW_S) -> None:
         self.name = name
-        self.title = f"{paper.title} under {autopilot}"
+        self.title = f"{Takeoff.title} under {autopilot}"
         self.space = PolicySpace(gains)
-        self.window_s = paper.window_s
-        self.scatter = _scatter(paper.window_s, degrees_of_freedom=1.0, measured=False)
+        self.window_s = window_s
+        self.scatter = _scatter(window_s, degrees_of_freedom=1.0, measured=False)
         """That of the paper's drone, as none was measured; under PX4 one flight scattered three times as much."""
         self._autopilot: Final = autopilot
-        self._paper: Final = paper
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The takeoff with another window; itself if that is its own."""
-        paper = self._paper.configured(options)
-        return self if paper is self._paper else type(self)(self.name, self._autopilot, self.space.gains, paper=paper)
+        window_s = float(with_defaults(options, OPTIONS)["window_s"])
+        if window_s == self.window_s:
+            return self
+        return type(self)(self.name, self._autopilot, self.space.gains, window_s=window_s)
 
     @property
     def grid_s(self) -> Samples:
         """The same as the paper's takeoff."""
-        return self._paper.grid_s
-
-    def errors(self, outputs: Matrix) -> Vector:
-        """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
-        return self._paper.errors(outputs)
-
-    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
-        return self._paper.error(trajectory, accept_gaps=accept_gaps)
+        return grid_of(self.window_s)

@@ -88,12 +88,12 @@ class VerticalLoop(ModelledExperiment):
         self.model_parameters = model_parameters
         self.set_points = set_points
         self.window_s = window_s
-        self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
+        self._samples: Final = len(self.grid_s)
 
     @property
     def grid_s(self) -> Samples:
-        """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
-        return np.arange(self._samples) / RATE_HZ
+        """As `grid_of` the window."""
+        return grid_of(self.window_s)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
@@ -142,6 +142,11 @@ class VerticalLoop(ModelledExperiment):
 
     def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
         return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
+
+
+def grid_of(window_s: float) -> Samples:
+    """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
+    return np.arange(int(np.ceil(window_s * RATE_HZ)) + 1) / RATE_HZ
 
 
 def counts(gains: Vector | Matrix) -> Counts:

@@ -164,13 +164,7 @@ def _flight(experiment: Takeoff, takeoff: LoggedTakeoff) -> Flight:
     for gain in experiment.space.gains:
         if reason := gain.refusal_by_controller(takeoff.gains[gain.name]):
             raise _unanswered(f"has a takeoff with {gain.name} that {reason}")
-    return Flight(
-        number=takeoff.number,
-        gains=takeoff.gains,
-        trajectory=takeoff.trajectory,
-        error=experiment.error(takeoff.trajectory),
-        outcome="valid",
-    )
+    return experiment.scored_flight(takeoff.number, takeoff.gains, takeoff.trajectory)
 
 
 def _require_likeness(best: Flight, residual_m: float) -> None:
