@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,14 +25,6 @@ RESERVED_BYTES: Final = 4 * 2**20
 """Reserved before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
 _UNFINISHED: Final = ".claimed"
 _FINISHED: Final = ".flight"
-
-
-@dataclass(frozen=True, slots=True)
-class SpooledRecord:
-    """A flight record in the spool, and the id of its flight row."""
-
-    flight_id: int
-    record: FlightRecord
 
 
 class Spool:
@@ -63,7 +55,7 @@ class Spool:
         path = self._path(flight_id, _UNFINISHED)
         try:
             with path.open("r+b") as file:
-                file.write(_pack(SpooledRecord(flight_id, record)))
+                file.write(_pack(flight_id, record))
                 file.truncate()
                 os.fsync(file.fileno())
             path.replace(self._path(flight_id, _FINISHED))
@@ -78,7 +70,7 @@ class Spool:
         """Flights whose records are in the spool."""
         return sorted(int(path.stem) for path in self._folder.glob(f"*{_FINISHED}"))
 
-    def read(self, flight_id: int) -> SpooledRecord:
+    def read(self, flight_id: int) -> FlightRecord:
         """Read a record. Raises StorageError when the file is damaged."""
         path = self._path(flight_id, _FINISHED)
         try:
@@ -116,11 +108,10 @@ class Spool:
         return self._folder / f"{flight_id}{suffix}"
 
 
-def _pack(spooled: SpooledRecord) -> bytes:
-    record = spooled.record
+def _pack(flight_id: int, record: FlightRecord) -> bytes:
     trajectory = record.trajectory
     header = {
-        "flight_id": spooled.flight_id,
+        "flight_id": flight_id,
         "ending": record.ending,
         "end": asdict(record.end),
         "settings": dict(record.settings),
@@ -134,7 +125,7 @@ def _pack(spooled: SpooledRecord) -> bytes:
     return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
 
 
-def _unpack(content: bytes) -> SpooledRecord:
+def _unpack(content: bytes) -> FlightRecord:
     digest, _, body = content.partition(b"\n")
     if hashlib.sha256(body).hexdigest().encode() != digest:
         raise ValueError("its checksum is wrong")
@@ -144,14 +135,11 @@ def _unpack(content: bytes) -> SpooledRecord:
     channels = dict(zip(header["channels"], values, strict=True))
     ending: Ending = header["ending"]
     settings: dict[str, OptionValue] = header["settings"]
-    return SpooledRecord(
-        header["flight_id"],
-        FlightRecord(
-            trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
-            ending=ending,
-            end=FLIGHT_END.validate_python(header["end"] if "end" in header else _earlier_end(header)),
-            settings=settings,
-        ),
+    return FlightRecord(
+        trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
+        ending=ending,
+        end=FLIGHT_END.validate_python(header["end"] if "end" in header else _earlier_end(header)),
+        settings=settings,
     )
 
 

@@ -256,7 +256,7 @@ class FlightRunner:
     def _recover_record(self, flight_id: int) -> None:
         """Move a record from the spool into the database; set a damaged or refused one aside. Raises StorageError."""
         try:
-            record = self._spool.read(flight_id).record
+            record = self._spool.read(flight_id)
         except StorageError as error:
             self._set_record_aside(flight_id, error)
             return

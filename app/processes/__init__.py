@@ -16,7 +16,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.forkserver import ensure_running
 from traceback import format_exc
-from typing import Any, Final, Generic, Self, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 PRELOADED: Final = ("__main__", "app.runtime.preload")
 DEATH_TIMEOUT_S: Final = 5.0
@@ -105,31 +105,27 @@ class ChildProcess:
 
 
 @dataclass(frozen=True, slots=True)
-class TaskResult(Generic[T]):
-    result: T
-
-
-@dataclass(frozen=True, slots=True)
 class TaskError:
-    """An exception that the task raised; its note has the traceback."""
+    """What a child process sends in place of a result: the exception that the task raised, with the traceback as its
+    note."""
 
     error: Exception
 
 
-def perform(task: Callable[[], T]) -> TaskResult[T] | TaskError:
+def perform(task: Callable[[], T]) -> T | TaskError:
     """Call a task in the child process, and return what to send to the parent."""
     try:
-        return TaskResult(task())
+        return task()
     except Exception as error:  # noqa: BLE001 - outermost frame of the process
         error.add_note(format_exc())
         return TaskError(error)
 
 
-def result_of(outcome: TaskResult[T] | TaskError) -> T:
+def result_of(outcome: T | TaskError) -> T:
     """The result that a child process has sent. Raises what the task raised."""
     if isinstance(outcome, TaskError):
         raise outcome.error
-    return outcome.result
+    return outcome
 
 
 def follow_parent(niceness: int) -> None:

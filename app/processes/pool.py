@@ -14,7 +14,7 @@ from typing import Final, ParamSpec, Self, TypeVar
 import structlog
 
 from app.core.errors import GainlineError
-from app.processes import ChildProcess, ProcessDiedError, TaskError, TaskResult, follow_parent, perform, result_of
+from app.processes import ChildProcess, ProcessDiedError, TaskError, follow_parent, perform, result_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -96,7 +96,7 @@ class _ComputeProcess:
         try:
             with suppress(OSError):  # the process is dead: `receive` says so
                 child.send(task)
-            outcome: TaskResult[T] | TaskError = child.receive()
+            outcome: T | TaskError = child.receive()
         except ProcessDiedError:
             with self._lock:
                 if self._closed:

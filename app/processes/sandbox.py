@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final, ParamSpec, TypeVar
 
 from app.common.errors import InputError, Problem, UnavailableError
-from app.processes import ChildProcess, ProcessDiedError, TaskError, TaskResult, perform, result_of
+from app.processes import ChildProcess, ProcessDiedError, TaskError, perform, result_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -60,7 +60,7 @@ def _run(limits: Limits, task: Callable[[], T]) -> T:
         if not child.pipe.poll(limits.wall_s):
             raise _too_much(limits)
         try:
-            outcome: TaskResult[T] | TaskError = child.receive()
+            outcome: T | TaskError = child.receive()
         except ProcessDiedError as error:  # the processor time was used up, or the system ran out of memory
             raise _too_much(limits) from error
     try:

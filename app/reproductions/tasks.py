@@ -11,7 +11,7 @@ import structlog
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob
-from app.processes import ChildProcess, ProcessDiedError, TaskError, TaskResult, result_of
+from app.processes import ChildProcess, ProcessDiedError, TaskError, result_of
 from app.reproductions.registry import ProgressReport, reproduce
 from app.reproductions.results import Result
 from app.reproductions.service import read_order
@@ -59,7 +59,7 @@ class ReproductionJob:
         due_s = 0.0
         while True:
             if process.pipe.poll(max(due_s - monotonic(), 0.0)):
-                message: ProgressReport | TaskResult[Result] | TaskError = process.receive()
+                message: ProgressReport | Result | TaskError = process.receive()
                 if not isinstance(message, ProgressReport):
                     return result_of(message)
                 latest = message

@@ -39,6 +39,8 @@ class FaultTarget(Protocol):
 class Fault:
     """Base of all faults, without effect; faults override what they change."""
 
+    receives_nothing = False
+
     def begin(self, drone: FaultTarget) -> None:
         """Begin the fault."""
 
@@ -52,11 +54,6 @@ class Fault:
     def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
         """Return the changed packets of one tick."""
         return list(frames)
-
-    @property
-    def receives_nothing(self) -> bool:
-        """Whether nothing is received."""
-        return False
 
 
 class MissingMessages(Fault):
@@ -141,20 +138,16 @@ def _drift(drone: FaultTarget, on: bool) -> None:
 class LinkLost(Fault):
     """No packets pass in either direction; the autopilot continues to fly."""
 
+    receives_nothing = True
+
     def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002 - none of them passes
         return []
-
-    @property
-    def receives_nothing(self) -> bool:
-        return True
 
 
 class Deaf(Fault):
     """The drone receives nothing; its own packets arrive."""
 
-    @property
-    def receives_nothing(self) -> bool:
-        return True
+    receives_nothing = True
 
 
 @dataclass

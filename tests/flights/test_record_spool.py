@@ -31,16 +31,15 @@ def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
     spool.write(7, flown)
     assert spool.flight_ids() == [7]
     kept = spool.read(7)
-    assert kept.flight_id == 7
-    assert (kept.record.ending, kept.record.end, kept.record.settings) == (
+    assert (kept.ending, kept.end, kept.settings) == (
         flown.ending,
         flown.end,
         flown.settings,
     )
-    np.testing.assert_array_equal(kept.record.trajectory.time_s, flown.trajectory.time_s)
-    assert list(kept.record.trajectory.channels) == ["altitude_m", "thrust"]
+    np.testing.assert_array_equal(kept.trajectory.time_s, flown.trajectory.time_s)
+    assert list(kept.trajectory.channels) == ["altitude_m", "thrust"]
     for name, values in flown.trajectory.channels.items():
-        np.testing.assert_array_equal(kept.record.trajectory[name], values)
+        np.testing.assert_array_equal(kept.trajectory[name], values)
     spool.delete(7)
     assert list((tmp_path / "spool").iterdir()) == []
 

@@ -82,6 +82,7 @@ def test_options_are_completed_with_their_defaults() -> None:
     ("options", "reason"),
     [
         ({"scatter": -0.1}, "must be between 0 and 5 ×, got -0.1"),
+        ({"quadratic_share": 2.0}, "must be between 0 and 1, got 2"),
         ({"scatter": float("nan")}, "must be a finite number, got nan"),
         ({"scatter": "much"}, "must be a number, got 'much'"),
         ({"scatter": True}, "must be a number, got True"),
@@ -91,7 +92,8 @@ def test_options_are_completed_with_their_defaults() -> None:
 def test_an_impossible_option_is_refused_with_its_reason(options: Mapping[str, object], reason: str) -> None:
     with pytest.raises(InputError) as refusal:
         check_options("twin", options, field="campaign.vehicle")
-    assert [(p.field, p.reason) for p in refusal.value.problems] == [("campaign.vehicle.options.scatter", reason)]
+    (name,) = options
+    assert [(p.field, p.reason) for p in refusal.value.problems] == [(f"campaign.vehicle.options.{name}", reason)]
 
 
 def test_every_wrong_option_is_named_at_once() -> None:

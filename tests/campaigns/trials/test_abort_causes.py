@@ -206,4 +206,4 @@ def test_a_record_that_waits_on_the_disk_keeps_why_it_was_broken_off(tmp_path: P
     spool = Spool(tmp_path)
     spool.reserve(1)
     spool.write(1, create_record(ending="aborted", reason="enough", on_request=True))
-    assert spool.read(1).record.end == FlightEnd(failure=Failure.OPERATOR, request=StopRequest("enough"))
+    assert spool.read(1).end == FlightEnd(failure=Failure.OPERATOR, request=StopRequest("enough"))
