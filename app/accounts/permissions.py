@@ -110,51 +110,32 @@ def require(act: Permission, caller: Caller, vehicle: str = "") -> None:
     concerned."""
     if is_allowed(act, caller):
         return
-    rule = PERMISSION_RULES[act]
+    rule, because = PERMISSION_RULES[act], "connected over a link" if act is Permission.LINK else "a real vehicle"
     if caller.exposed and not rule.exposed:
-        raise _exposed(act, vehicle)
+        raise NotAllowedError(
+            f"{vehicle} cannot be commanded from this server: it is {because}, and other devices can reach the server.",
+            hint="Start the server with --host 127.0.0.1 on the computer that has the link to the vehicle.",
+        )
+    if caller.place is RequestOrigin.ELSEWHERE and rule.elsewhere is None:
+        raise NotAllowedError(
+            f"{vehicle} is {because}: it accepts commands from this computer only, and the request came "
+            f"{caller.because}.",
+            hint="Use a browser on the computer that runs Gainline, at the address that the terminal printed, "
+            "without a proxy or tunnel.",
+        )
     if caller.place is RequestOrigin.ELSEWHERE:
-        raise _elsewhere(act, caller, vehicle) if rule.elsewhere is None else _no_key_elsewhere(caller)
-    raise _locked(act, vehicle)
-
-
-def _describe_permission(act: Permission, vehicle: str) -> str:
-    return f"{vehicle} is connected over a link" if act is Permission.LINK else f"{vehicle} is a real vehicle"
-
-
-def _exposed(act: Permission, vehicle: str) -> NotAllowedError:
-    return NotAllowedError(
-        f"{vehicle} cannot be commanded from this server: {_describe_permission(act, 'it')}, and other devices can "
-        "reach the server.",
-        hint="Start the server with --host 127.0.0.1 on the computer that has the link to the vehicle.",
-    )
-
-
-def _elsewhere(act: Permission, caller: Caller, vehicle: str) -> NotAllowedError:
-    return NotAllowedError(
-        f"{_describe_permission(act, vehicle)}: it accepts commands from this computer only, and the request came "
-        f"{caller.because}.",
-        hint="Use a browser on the computer that runs Gainline, at the address that the terminal printed, "
-        "without a proxy or tunnel.",
-    )
-
-
-def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
-    return NotAllowedError(
-        f"This browser has read-only access, because the request came {caller.because}.",
-        hint=UNLOCK_HINT,
-        script_hint=_FOR_SCRIPTS,
-    )
-
-
-def _locked(act: Permission, vehicle: str) -> NotAllowedError:
+        raise NotAllowedError(
+            f"This browser has read-only access, because the request came {caller.because}.",
+            hint=UNLOCK_HINT,
+            script_hint=_FOR_SCRIPTS,
+        )
     if act is Permission.TAKE_OFF:
-        return NotAllowedError(
+        raise NotAllowedError(
             f"{vehicle} is a real vehicle: only its operator can start the takeoff, in an unlocked browser.",
             hint=UNLOCK_HINT,
             script_hint=STAGED_BY_SCRIPT,
         )
-    return NotAllowedError(
+    raise NotAllowedError(
         f"{vehicle} is a real vehicle, and this browser is not unlocked for it.",
         hint=f"{UNLOCK_HINT} Abort and Land still work without it.",
         script_hint=f"{_FOR_SCRIPTS} Abort and land need no key.",

@@ -12,7 +12,7 @@ from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.theme import ThemeName
-from app.figures.vehicle_wear import BatteriesFigure, BatteryFlight, CalibrationFigure, Point
+from app.figures.vehicle_wear import BatteriesFigure, CalibrationFigure, Point
 from app.fleet import service as fleet
 
 _STRATEGY: Final = "calibrated"
@@ -58,8 +58,7 @@ def vehicle_figure(session: Session, vehicle_id: int, name: str, theme: ThemeNam
     """Figure of a vehicle: `calibration` or `batteries`. Raises NotFoundError."""
     if name == "batteries":
         fleet.get_vehicle(session, vehicle_id)
-        flights = [BatteryFlight(**each) for each in fleet.battery_flights(session, vehicle_id)]
-        return card_of(BatteriesFigure(tuple(flights), theme))
+        return card_of(BatteriesFigure(tuple(fleet.battery_flights(session, vehicle_id)), theme))
     found = calibration_of(session, vehicle_id)
     points = tuple(
         Point(flight=one.flight, campaign_id=one.campaign_id, trial_number=one.trial_number, fitted=_by_name(one))

@@ -6,7 +6,7 @@ Registration is in `registration`, requests beside flights in `commands`, operat
 from collections.abc import Mapping
 from datetime import datetime
 from types import MappingProxyType
-from typing import Final, TypedDict
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -19,6 +19,7 @@ from app.db.base import added
 from app.db.models import VehicleRow
 from app.db.pages import Order, page_of
 from app.db.types import utc_now
+from app.figures.vehicle_wear import BatteryFlight
 from app.fleet import repository
 from app.fleet.schemas import Vehicle, VehicleChoice
 from app.fleet.views import (
@@ -230,19 +231,10 @@ def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:
     return vehicle_view(repository.get_one(session, vehicle_id))
 
 
-class BatteryReading(TypedDict):
-    """A flight's battery: the flight's number among the vehicle's, the label, and the voltages, V."""
-
-    flight: int
-    battery: str
-    before_v: float | None
-    after_v: float | None
-
-
-def battery_flights(session: Session, vehicle_id: int) -> list[BatteryReading]:
+def battery_flights(session: Session, vehicle_id: int) -> list[BatteryFlight]:
     """Battery readings before and after each flight, oldest first."""
     return [
-        BatteryReading(flight=place, battery=row.battery, before_v=row.battery_v_before, after_v=row.battery_v_after)
+        BatteryFlight(flight=place, battery=row.battery, before_v=row.battery_v_before, after_v=row.battery_v_after)
         for place, row in enumerate(repository.flights_of(session, vehicle_id), start=1)
     ]
 
