@@ -44,24 +44,6 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlightData:
-    """One flown trial.
-
-    `error` and `predicted_error` are in the experiment's error unit, None if there is none; `interval` is the predicted
-    interval of the error; `glitches` are the times, s, at which the record is not plausible.
-    """
-
-    number: int
-    gains: Gains
-    outcome: Outcome
-    curve: Curve | None
-    error: float | None
-    predicted_error: float | None = None
-    interval: Range | None = None
-    glitches: tuple[Range, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
     """The predicted band of a flight: two curves at the same times."""
 
@@ -70,18 +52,33 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NextFlight:
-    """The proposed next flight, with the model's curve, its band, and the interval of its error, if there are any.
-
-    A curve without an error is that of a model too uncertain to predict one.
-    """
+class AnyFlight:
+    """A trial that was flown, or is next: its output as flown, or as the model has it, with the prediction of its
+    error in the experiment's error unit and the interval of that; None where there is none."""
 
     number: int
     gains: Gains
     curve: Curve | None
-    predicted_error: float | None
-    band: Band | None = None
+    predicted_error: float | None = None
     interval: Range | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightData(AnyFlight):
+    """One flown trial, with its error, None if there is none; `glitches` are the times, s, at which the record is not
+    plausible."""
+
+    outcome: Outcome
+    error: float | None
+    glitches: tuple[Range, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NextFlight(AnyFlight):
+    """The proposed next flight, with its predicted band, if there is one. A curve without an error is that of a model
+    too uncertain to predict one."""
+
+    band: Band | None = None
 
     @property
     def curve_name(self) -> str:

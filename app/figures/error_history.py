@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Final
 from app.core import formatting
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.data import FlightData, History, NextFlight, Range, last_number
+from app.figures.data import AnyFlight, FlightData, History, Range, last_number
 from app.figures.overlays import MANY, off_scale_traces
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -217,7 +217,7 @@ class ErrorsFigure:
     def _next(self) -> dict[str, object]:
         return {} if self.history.proposal is None else {"next": self.history.proposal.number}
 
-    def _predicted_flights(self) -> list[FlightData | NextFlight]:
+    def _predicted_flights(self) -> list[AnyFlight]:
         """The flights whose predictions are drawn."""
         flown = () if self._is_crowded else self.history.flights
         return [*flown, *([] if self.history.proposal is None else [self.history.proposal])]
