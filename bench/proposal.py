@@ -20,7 +20,8 @@ from app.campaigns.computation import warm_up
 from app.campaigns.proposals import PROPOSAL_JOB
 from app.campaigns.schemas import Definition, NewCampaign, StopRule
 from app.campaigns.tasks import ProposalJob
-from app.campaigns.trials.schemas import FlightOrder, NewTrial
+from app.campaigns.trials.schemas import FlightOrder, TrialPlan
+from app.campaigns.trials.service import create_trial
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
@@ -60,7 +61,8 @@ def fly(database: Database, campaign_id: int) -> bool:
         following = campaigns.next_flight(session, campaign_id).proposal
         if following is None or "plan" not in campaigns.get_campaign(session, campaign_id).actions:
             return False
-        flights.plan_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
+        planned = create_trial(session, campaign_id, TrialPlan(proposal_id=following.id))
+        flights.fly_new_trial(session, planned.id, FlightOrder(speed=None))
         task = flight_rows.claim_flight(session, WORKER)
     assert task is not None
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:

@@ -54,15 +54,15 @@ def serve(
     host: Annotated[
         str | None,
         typer.Option(
+            show_default="GAINLINE_HOST, else 127.0.0.1",
             help="Address to listen on. 0.0.0.0 admits other devices, such as a tablet: anyone who can reach "
             "this computer over the network can then view every campaign, and browsers unlocked with "
-            "`gainline unlock` can change campaigns and fly simulations; vehicles with a link cannot be flown.  "
-            "[default: GAINLINE_HOST, else 127.0.0.1]"
+            "`gainline unlock` can change campaigns and fly simulations; vehicles with a link cannot be flown.",
         ),
     ] = None,
     port: Annotated[
         int | None,
-        typer.Option(min=0, max=65535, help="Port; 0 selects a free one.  [default: GAINLINE_PORT, else 8000]"),
+        typer.Option(min=0, max=65535, show_default="GAINLINE_PORT, else 8000", help="Port; 0 selects a free one."),
     ] = None,
     data_dir: DataDir = None,
     worker: Annotated[bool, typer.Option(help="Also start the worker, which flies and computes.")] = True,
@@ -149,18 +149,17 @@ def sim_drone(
     autopilot: Annotated[
         str | None,
         typer.Option(
-            show_default=False,
-            help="Autopilot to simulate: paparazzi, paparazzi-bare, paparazzi-5.10, ardupilot, ardupilot-4.7 or px4. "
-            "[default: paparazzi]",
+            show_default="paparazzi",
+            help="Autopilot to simulate: paparazzi, paparazzi-bare, paparazzi-5.10, ardupilot, ardupilot-4.7 or px4.",
         ),
     ] = None,
     link: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
+            show_default="udp:127.0.0.1:4244@4245 for Paparazzi, else udp:127.0.0.1:14550",
             help="Address of the ground station and, after @, local port of the drone: "
-            "udp:HOST:PORT[@LOCALPORT]. [default: udp:127.0.0.1:4244@4245 for Paparazzi, else "
-            "udp:127.0.0.1:14550]",
+            r"udp:HOST:PORT\[@LOCALPORT].",
         ),
     ] = None,
     vehicle: Annotated[str, typer.Option(help="Flight model: jsbsim or twin.")] = "jsbsim",
@@ -285,11 +284,11 @@ def analyze(
 def report(
     campaign: GivenCampaign,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Output file.  [default: campaign-ID-report.html]")
+        Path | None, typer.Option(metavar="FILE", show_default="campaign-ID-report.html", help="Output file.")
     ] = None,
     kind: Annotated[
         Literal["html", "pdf"] | None,
-        typer.Option("--format", help="html or pdf.  [default: from the extension of FILE, else html]"),
+        typer.Option("--format", show_default="from the extension of FILE, else html", help="html or pdf."),
     ] = None,
     data_dir: DataDir = None,
 ) -> None:
@@ -303,7 +302,7 @@ def report(
 def bundle(
     campaign: GivenCampaign,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Output file.  [default: campaign-ID.gainline.zip]")
+        Path | None, typer.Option(metavar="FILE", show_default="campaign-ID.gainline.zip", help="Output file.")
     ] = None,
     data_dir: DataDir = None,
 ) -> None:

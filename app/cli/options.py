@@ -38,7 +38,7 @@ JsonOut = Annotated[
     Path | None,
     typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.", callback=_spare_recording),
 ]
-DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [default: GAINLINE_DATA_DIR]")]
+DataDir = Annotated[Path | None, typer.Option(show_default="GAINLINE_DATA_DIR", help="Folder of the database.")]
 CampaignSource = Annotated[
     str,
     typer.Argument(

@@ -17,7 +17,8 @@ from app.campaigns.campaign_files import CampaignFile, gains_by_hand
 from app.campaigns.computation import compute
 from app.campaigns.definitions import check_campaign, stored
 from app.campaigns.trials.reviews import classify_trial
-from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
+from app.campaigns.trials.schemas import Classification, FlightOrder, TrialPlan
+from app.campaigns.trials.service import create_trial
 from app.campaigns.trials.views import reason_of
 from app.cli.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
@@ -38,7 +39,7 @@ from app.fleet.registration import register_vehicle
 from app.fleet.schemas import NewVehicle, VehicleChoice
 from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
-from app.flights.service import plan_trial
+from app.flights.service import fly_new_trial
 from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError, find_mismatch
 from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind, open_vehicle
@@ -151,11 +152,10 @@ class _Campaign:
             if given and len(trials) == len(given):
                 return f"All {len(given)} given gain sets have been flown."
             # Built without the API's limits on text: a reason on the command line may be of any length.
-            new = NewTrial.model_construct(
+            new = TrialPlan.model_construct(
                 proposal_id=None if given else proposal.id,
                 gains=dict(given[len(trials)]) if given else None,
                 overrule=overrule or None,
-                fly=FlightOrder(speed=None),
             )
             flown = self._fly_trial(new)
             self._display.landed(flown, flown.kind if given else proposal.kind)
@@ -170,10 +170,11 @@ class _Campaign:
             campaign = campaigns.get_row(session, self._id)
             return proposal, campaign.stop_reason if campaign.state == CampaignState.FINISHED else None
 
-    def _fly_trial(self, new: NewTrial) -> TrialRow:
+    def _fly_trial(self, new: TrialPlan) -> TrialRow:
         """Fly one trial and classify it. A flight with glitches does not count, because no person reviews it."""
         with self._database.write() as session:
-            planned = plan_trial(session, self._id, new)
+            planned = create_trial(session, self._id, new)
+            fly_new_trial(session, planned.id, FlightOrder(speed=None))
             request = flight_rows.claim_flight(session, "gainline run")
             assert request is not None
         self._display.planned(planned.number, request.gains)

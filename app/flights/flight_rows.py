@@ -1,6 +1,6 @@
-"""States of a flight in the database, as the worker that carries it out records them.
+"""States of a flight in the database: its request, and what the worker that carries it out records.
 
-    claim_flight → record_staged → record_lift_off → record_outcome
+    add_flight → claim_flight → record_staged → record_lift_off → record_outcome
 
 A flight of mode `stage` waits between record_staged and record_lift_off, for what `clearance_of` says. `record_outcome`
 and `give_up_flight` may be called at any stage: a flight whose takeoff was not commanded was not flown, nor one whose
@@ -19,11 +19,12 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session, joinedload
 
 from app.campaigns import proposals
-from app.campaigns.history import set_flight_state, set_trial_state
+from app.campaigns.history import set_flight_state, set_trial_state, trial_row
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
-from app.common.states import FlightState, TrialState, VehicleState
+from app.common.states import FlightMode, FlightState, TrialState, VehicleState
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
+from app.db.base import added
 from app.db.models import FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
@@ -113,6 +114,24 @@ def _read_running(session: Session, flight_id: int) -> FlightRow:
 
 def _first_requested(session: Session) -> FlightRow | None:
     return session.scalar(_WITH_ALL.where(FlightRow.state == FlightState.REQUESTED).limit(1))
+
+
+def add_flight(session: Session, trial_id: int, *, mode: FlightMode, speed: float | None) -> FlightRow:
+    """Add the request that a vehicle flies a trial's gains, with the label of its battery. Raises NotFoundError."""
+    trial, now = trial_row(session, trial_id), utc_now()
+    flight = FlightRow(
+        campaign_id=trial.campaign_id,
+        trial_id=trial_id,
+        vehicle_id=trial.campaign.vehicle_id,
+        state=FlightState.REQUESTED,
+        mode=mode,
+        gains=trial.gains,
+        speed=speed,
+        battery=trial.campaign.vehicle.battery,
+        requested_at=now,
+        take_off_at=now if mode == "fly" else None,
+    )
+    return added(session, flight)
 
 
 def claim_flight(session: Session, worker: str) -> FlightRequest | None:

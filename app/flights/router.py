@@ -1,8 +1,10 @@
 """Flights over HTTP: plan and fly, stage, take off, abort."""
 
 from fastapi import APIRouter, Depends, status
+from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
+from app.campaigns.trials import service as trials
 from app.campaigns.trials.router import TrialPredictorDep
 from app.campaigns.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
 from app.flights import service
@@ -17,10 +19,12 @@ def create_trial(
     act: IdempotentPost, asking: RequestContextDep, predictor: TrialPredictorDep, campaign_id: Id, body: NewTrial
 ) -> Trial:
     """Plan a trial of the proposal, a variant or custom gains and, with `fly`, request its flight at once."""
-    return act(
-        lambda session: service.plan_trial(session, campaign_id, body, asking, predict=predictor.predict),
-        ahead=lambda session: predictor.prepare(session, campaign_id, body),
-    )
+
+    def plan(session: Session) -> Trial:
+        trial = trials.create_trial(session, campaign_id, body, asking, predict=predictor.predict)
+        return trial if body.fly is None else service.fly_new_trial(session, trial.id, body.fly, asking)
+
+    return act(plan, ahead=lambda session: predictor.prepare(session, campaign_id, body))
 
 
 @router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)

@@ -1,4 +1,5 @@
-"""Requests for flights, from the first to the operator's takeoff request. The worker's side is in `flight_rows`."""
+"""Requests for flights, from the first to the operator's takeoff request: who may request which, and when. The rows
+themselves are in `flight_rows`."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,7 +12,7 @@ from app.campaigns import history, rehearsals
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_flight_state
 from app.campaigns.trials import service as trials
-from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Trial
+from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, Trial
 from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action
@@ -26,7 +27,6 @@ from app.common.states import (
     TrialState,
 )
 from app.core.errors import GainlineError
-from app.db.base import added
 from app.db.models import FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
@@ -38,6 +38,7 @@ from app.fleet.control import (
     require_may_command,
     require_not_controlled_by_other,
 )
+from app.flights import flight_rows
 from app.flights.flight_commands import record_abort, record_flight_command
 from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
 from app.flights.schemas import TrialReadiness
@@ -57,20 +58,11 @@ def warm_gate_cache(session: Session, trial_id: int) -> None:
         check_own_gains(session, row.campaign, row.gains)
 
 
-def plan_trial(
-    session: Session,
-    campaign_id: int,
-    new: NewTrial,
-    context: RequestContext = LOCAL_CLI,
-    *,
-    predict: trials.Predict | None = None,
-) -> Trial:
-    """Plan a trial and, with `fly`, request its flight. Raises as `create_trial` and `fly_trial` do."""
-    trial = trials.create_trial(session, campaign_id, new, context, predict=predict)
-    if new.fly is None:
-        return trial
-    row = history.trial_row(session, trial.id)
-    request_flight(session, row, context, speed=new.fly.speed)
+def fly_new_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Request the flight of a trial that was planned in the same transaction, whose gains have thus just passed the
+    gate. Raises as `fly_trial` does."""
+    row = history.trial_row(session, trial_id)
+    request_flight(session, row, context, speed=order.speed)
     return trial_view(session, row)
 
 
@@ -129,20 +121,7 @@ def request_flight(
     fleet.require_window_fits(vehicle, experiment_of_campaign(campaign).window_s)
     fleet.require_ready(session, vehicle, mode)
     by = require_not_controlled_by_other(vehicle, context)
-    now = utc_now()
-    flight = FlightRow(
-        campaign_id=campaign.id,
-        trial_id=row.id,
-        vehicle_id=vehicle.id,
-        state=FlightState.REQUESTED,
-        mode=mode,
-        gains=row.gains,
-        speed=speed,
-        battery=vehicle.battery,
-        requested_at=now,
-        take_off_at=now if mode == "fly" else None,
-    )
-    added(session, flight)
+    flight = flight_rows.add_flight(session, row.id, mode=mode, speed=speed)
     record_flight_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 

@@ -6,19 +6,9 @@ from typing import Annotated
 from pydantic import Field
 
 from app.common.schemas import Gains, Schema
+from app.core.analysis.analysis import Behaviour
 from app.figures.base import Card
 from app.figures.theme import ThemeName
-
-
-class LoggedBehaviour(Schema):
-    """How the altitude loop behaved in the flight."""
-
-    duration_s: Annotated[float, Field(description="time analysed")]
-    error_m: Annotated[float, Field(description="mean distance between reference and altitude")]
-    largest_deviation_m: float
-    reference_range_m: float
-    throttle_mean: float
-    saturated_share: Annotated[float, Field(description="share of the rows with the throttle at a limit")]
 
 
 class EstimatedValue(Schema):
@@ -89,7 +79,7 @@ class HoverSetting(Schema):
 class ManoeuvreNumbers(Schema):
     """The analysis of an ArduCopter's or PX4's log. `assessments` begins with the gains flown."""
 
-    behaviour: LoggedBehaviour
+    behaviour: Behaviour
     vehicle: EstimatedVehicle
     assessments: list[GainsInManoeuvre]
     proposed: GainsInManoeuvre | None

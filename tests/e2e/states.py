@@ -23,7 +23,7 @@ from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
 from app.campaigns.trials import photos, records, reviews
 from app.campaigns.trials import service as trials
-from app.campaigns.trials.schemas import Classification, NewTrial
+from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
@@ -228,8 +228,8 @@ class States:
     def _fly(self, campaign_id: int, chosen: Json | None, *, stop: StopRequest | None = None) -> int:
         def fly(session: Session) -> int:
             what = {"proposal_id": _proposed(session, campaign_id).id} if chosen is None else chosen
-            new = NewTrial.model_validate({**what, "fly": {"speed": None}})
-            trial = flights.plan_trial(session, campaign_id, new)
+            trial = trials.create_trial(session, campaign_id, NewTrial.model_validate(what))
+            flights.fly_new_trial(session, trial.id, FlightOrder(speed=None))
             _carry_out(session, trial.id, stop)
             _propose(session, campaign_id)
             return trial.id

@@ -24,7 +24,7 @@ export type {
   NewTrial,
   NewVehicle,
   NextFlight,
-  OptionInfo,
+  Option as OptionInfo,
   PresetInfo,
   Proposal,
   RepeatGroup,

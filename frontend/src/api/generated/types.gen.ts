@@ -194,6 +194,39 @@ export type AutopilotInfo = {
 };
 
 /**
+ * Behaviour
+ *
+ * The flight itself: analysed time, s; mean and largest distance between reference and altitude, m; range of the
+ * reference, m; mean throttle, and share of the rows with the throttle at a limit.
+ */
+export type Behaviour = {
+    /**
+     * Duration S
+     */
+    duration_s: number;
+    /**
+     * Error M
+     */
+    error_m: number;
+    /**
+     * Largest Deviation M
+     */
+    largest_deviation_m: number;
+    /**
+     * Reference Range M
+     */
+    reference_range_m: number;
+    /**
+     * Throttle Mean
+     */
+    throttle_mean: number;
+    /**
+     * Saturated Share
+     */
+    saturated_share: number;
+};
+
+/**
  * BestTrial
  *
  * The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
@@ -1308,7 +1341,7 @@ export type ExperimentInfo = {
     /**
      * Options
      */
-    options: Array<OptionInfo>;
+    options: Array<Option>;
 };
 
 /**
@@ -2544,44 +2577,6 @@ export type LogLine = {
 };
 
 /**
- * LoggedBehaviour
- *
- * How the altitude loop behaved in the flight.
- */
-export type LoggedBehaviour = {
-    /**
-     * Duration S
-     *
-     * time analysed
-     */
-    duration_s: number;
-    /**
-     * Error M
-     *
-     * mean distance between reference and altitude
-     */
-    error_m: number;
-    /**
-     * Largest Deviation M
-     */
-    largest_deviation_m: number;
-    /**
-     * Reference Range M
-     */
-    reference_range_m: number;
-    /**
-     * Throttle Mean
-     */
-    throttle_mean: number;
-    /**
-     * Saturated Share
-     *
-     * share of the rows with the throttle at a limit
-     */
-    saturated_share: number;
-};
-
-/**
  * Loss
  *
  * Something that takes readiness back, what it means now, and the way on.
@@ -2607,7 +2602,7 @@ export type Loss = {
  * The analysis of an ArduCopter's or PX4's log. `assessments` begins with the gains flown.
  */
 export type ManoeuvreNumbers = {
-    behaviour: LoggedBehaviour;
+    behaviour: Behaviour;
     vehicle: EstimatedVehicle;
     /**
      * Assessments
@@ -2739,12 +2734,13 @@ export type NextFlight = {
 };
 
 /**
- * OptionInfo
+ * Option
  *
- * A setting of an experiment, a strategy or a vehicle: one of `choices`, or any value of the default's type within
- * `lower` … `upper` where `choices` is empty.
+ * One setting: one of `choices`, or any number of the default's type within `lower` … `upper`. `label`: the title
+ * without the help for entering a value, empty if it contains none. `autopilots`: those whose vehicles have it, empty
+ * for all.
  */
-export type OptionInfo = {
+export type Option = {
     /**
      * Name
      */
@@ -2754,37 +2750,33 @@ export type OptionInfo = {
      */
     title: string;
     /**
-     * Label
-     *
-     * the title without the help for entering a value; empty if it has none
-     */
-    label: string;
-    /**
-     * Unit
-     */
-    unit: string;
-    /**
      * Default
      */
     default: boolean | number | number | string;
     /**
-     * Choices
+     * Unit
      */
-    choices: Array<boolean | number | number | string>;
+    unit?: string;
     /**
      * Lower
      */
-    lower: number | null;
+    lower?: number | null;
     /**
      * Upper
      */
-    upper: number | null;
+    upper?: number | null;
+    /**
+     * Choices
+     */
+    choices?: Array<boolean | number | number | string>;
+    /**
+     * Label
+     */
+    label?: string;
     /**
      * Autopilots
-     *
-     * the autopilots that have this option; empty: all
      */
-    autopilots: Array<string>;
+    autopilots?: Array<string>;
 };
 
 /**
@@ -3681,7 +3673,7 @@ export type StrategyInfo = {
     /**
      * Options
      */
-    options: Array<OptionInfo>;
+    options: Array<Option>;
     /**
      * Experiments
      */
@@ -4586,7 +4578,7 @@ export type VehicleKindInfo = {
     /**
      * Options
      */
-    options: Array<OptionInfo>;
+    options: Array<Option>;
     /**
      * Highest Set Point M
      *

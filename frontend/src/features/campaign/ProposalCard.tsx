@@ -2,7 +2,7 @@ import { Button, Stack } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useReadOnlyReason } from "../../api/access";
-import { type RecordUpload, useCreateTrial } from "../../api/mutations";
+import type { RecordUpload } from "../../api/mutations";
 import { offersOf } from "../../api/problems";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
@@ -14,7 +14,7 @@ import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useHasModel, useUnits } from "../../ui/units";
 import { DeleteCampaign, StopCampaign } from "../campaigns/EndCampaign";
-import { isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
+import { isDoubtful, isRepeat, refusalOf, repeatSource } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
@@ -22,7 +22,7 @@ import { GateChecks, GateRefusal } from "./GateChecks";
 import { GroundedNote, useGroundedReason } from "./GroundedNote";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
-import { speedOf, watched } from "./nextStep";
+import { speedOf } from "./nextStep";
 import { OverruleGate } from "./OverruleGate";
 import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
@@ -172,13 +172,10 @@ interface ButtonsProps {
 /** Flies exactly the gains shown, once these have been predicted and have passed the gate. */
 function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary }: ButtonsProps) {
   const [speed, setSpeed] = useSpeed();
-  const create = useCreateTrial(campaign);
   const { worker } = useConnection();
   const { can_fly, id, is_real, needs_staging, registered } = campaign.vehicle;
   const isGrounded = useGroundedReason(id) !== "";
-  const { gains, gate, isChecked, isPredicted } = chosen;
-  const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
-  const trial = trialOf(proposal, chosen.choice, gains ?? {});
+  const { trial, gate, isChecked, isPlanning } = chosen;
   const order = { fly: { speed: speedOf(speed) } };
   const isWarned = chosen.choice !== undefined && isDoubtful(proposal);
   const isAdvised = proposal.recommended !== "stop" && !isWarned && !isSecondary;
@@ -188,8 +185,8 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
       size="lg"
       variant={isMain && isAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
-      loading={create.isPending}
-      disabled={!isReady || !worker || (isMain && isGrounded)}
+      loading={isPlanning}
+      disabled={trial === undefined || !worker || (isMain && isGrounded)}
       onClick={onClick}
     >
       {label}
@@ -198,32 +195,31 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   if (!can_fly) {
     return (
       <>
-        <ImportRecord upload={upload} {...(isReady ? { plan: trial } : {})} />
-        <Button variant="default" loading={create.isPending} disabled={!isReady} onClick={() => create.mutate(trial)}>
+        <ImportRecord upload={upload} {...(trial === undefined ? {} : { plan: trial })} />
+        <Button variant="default" loading={isPlanning} disabled={trial === undefined} onClick={chosen.plan}>
           Plan flight {number}
         </Button>
         <Note>Plan the flight to upload its record later.</Note>
-        <ErrorNotice error={create.error} />
+        <ErrorNotice error={chosen.planError} />
       </>
     );
   }
   return (
     <>
       <GroundedNote vehicleId={id} />
-      {!needs_staging &&
-        button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
+      {!needs_staging && button(`Fly flight ${number}`, true, () => chosen.fly(order))}
       {registered ? (
-        button("Open fly screen", needs_staging, () => create.mutate(trial))
+        button("Open fly screen", needs_staging, chosen.plan)
       ) : (
         <SpeedSwitch value={speed} onChange={setSpeed} />
       )}
       {isChecked && gate?.passed === false && !is_real && (
         <OverruleGate
-          pending={create.isPending}
-          onFly={(overrule) => watched(create.mutateAsync({ ...trial, overrule, ...(needs_staging ? {} : order) }))}
+          pending={isPlanning}
+          onFly={(overrule) => chosen.fly({ overrule, ...(needs_staging ? {} : order) })}
         />
       )}
-      <ErrorNotice error={create.error} />
+      <ErrorNotice error={chosen.planError} />
     </>
   );
 }

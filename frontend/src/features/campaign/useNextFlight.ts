@@ -1,11 +1,22 @@
 import { useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { type GainSet, useEvaluation } from "../../api/evaluation";
+import { useCreateTrial } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
-import type { Campaign, FlightChoice, Gain, GainsPrediction, Gate, Interval, Proposal } from "../../api/types";
+import type {
+  Campaign,
+  FlightChoice,
+  Gain,
+  GainsPrediction,
+  Gate,
+  Interval,
+  NewTrial,
+  Proposal,
+} from "../../api/types";
 import { typed, typedGain } from "../../ui/format";
-import { type ChoiceName, type GainRow, gainRows, isOutside, preselected, readGains } from "./choices";
+import { type ChoiceName, type GainRow, gainRows, isOutside, preselected, readGains, trialOf } from "./choices";
 import type { GainEntry } from "./GainTable";
+import { watched } from "./nextStep";
 
 /** What the charts draw in place of the proposal. */
 export interface Preview {
@@ -40,7 +51,17 @@ export interface ChosenFlight {
   error: unknown;
   /** Replaces some of the custom gains. */
   use: (gains: GainSet) => void;
+  /** The trial of these gains; undefined until they have been predicted and have passed the gate. */
+  trial: NewTrial | undefined;
+  plan: () => void;
+  /** Plans it as ordered, then shows the top of the page. */
+  fly: (order: FlightOrder) => void;
+  isPlanning: boolean;
+  planError: unknown;
 }
+
+/** Without `fly`, the flight is only planned. */
+type FlightOrder = Pick<NewTrial, "fly" | "overrule">;
 
 const NOTHING_PREDICTED = { predicted_error: null, interval: null, curve: null, lower: null, upper: null };
 const NO_GAINS: readonly Gain[] = [];
@@ -100,6 +121,12 @@ export function useNextFlight(
     setTexts({ ...texts, ...changed });
     setEdited(true);
   };
+  const create = useCreateTrial(campaign);
+  const isPredicted = isProposal || prediction.isCurrent;
+  const shownGate = isProposal ? proposal.gate : gate.result;
+  const isChecked = isProposal || gate.isCurrent;
+  const trial = trialOf(proposal, choice, gains ?? {});
+  const isReady = gains !== null && isChecked && isPredicted && shownGate?.passed === true;
   return {
     name,
     choice,
@@ -113,10 +140,15 @@ export function useNextFlight(
       choice === undefined ? { texts, reasons, refused, onText: (gain, text) => edit({ [gain]: text }) } : undefined,
     gains,
     predicted: isProposal ? proposal : predicted,
-    isPredicted: isProposal || prediction.isCurrent,
-    gate: isProposal ? proposal.gate : gate.result,
-    isChecked: isProposal || gate.isCurrent,
+    isPredicted,
+    gate: shownGate,
+    isChecked,
     error,
     use: (offers) => edit(Object.fromEntries(Object.entries(offers).map(([gain, value]) => [gain, typed(value)]))),
+    trial: isReady ? trial : undefined,
+    plan: () => create.mutate(trial),
+    fly: (order) => watched(create.mutateAsync({ ...trial, ...order })),
+    isPlanning: create.isPending,
+    planError: create.error,
   };
 }
