@@ -174,7 +174,7 @@ def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_s
     assert trust(client, campaign) == 1.0
 
 
-def test_an_abort_is_reported_once_without_repeating_the_word_and_whether_it_counts(
+def test_the_texts_of_an_abort_name_it_once_and_tell_whether_it_counts(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
     trial = aborted(client, database, campaign, on_request=True)

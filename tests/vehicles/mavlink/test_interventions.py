@@ -112,7 +112,6 @@ def test_a_flight_plan_that_lands_at_its_own_altitude_limit_counts_against_the_g
     walk.climb_rate_m_s = 1.0
     walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
-    assert "Its flight plan entered the block “land”." in walk.trial.why
     assert walk.gains_sent[0] == walk.plan.safe_gains[0]
 
 
@@ -120,7 +119,6 @@ def test_a_flight_plan_that_changes_block_by_itself_gets_land() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "Its flight plan entered the block “Standby”."
     assert walk.actions[-1] is Action.LAND
 
 
@@ -137,11 +135,7 @@ def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
     walk = TrialDriver(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
     walk.mode = "land"
     walk.pass_s(1.6)
-    assert (walk.state, walk.trial.failure, walk.trial.why) == (
-        State.ABORT_LAND,
-        Failure.OWN_LANDING,
-        "It entered mode land.",
-    )
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
 
 
 def test_the_mode_of_the_landing_before_is_no_landing() -> None:
@@ -170,7 +164,6 @@ def test_two_sources_that_disagree_for_a_third_of_a_second_land_the_vehicle() ->
     assert walk.state is State.RECORD
     watched(walk, 0.1, off_m=0.35)
     assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.DISAGREEMENT, "invalid")
-    assert walk.trial.why == "They were 0.35 m apart; more than 0.3 m for 0.3 s is not allowed."
     assert walk.gains_sent == []
 
 
@@ -181,18 +174,14 @@ def test_a_short_disagreement_and_a_small_one_are_borne() -> None:
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
 
 
-def test_a_second_source_that_loses_the_vehicle_lands_it() -> None:
+def test_a_second_source_that_loses_the_vehicle_or_falls_silent_for_a_second_lands_it() -> None:
     walk = watched(hovering(), 0.24, is_new=False)
     assert walk.state is State.RECORD
     watched(walk, 0.06, is_new=False)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
-    assert walk.trial.why == "The second source of altitude did not track it for more than 0.25 s."
-
-
-def test_a_second_source_that_falls_silent_lands_it_after_a_second() -> None:
     walk = hovering().pass_s(0.9)
     assert walk.state is State.RECORD
-    assert walk.pass_s(0.2).trial.why == "Nothing was received from the second source of altitude for 1 s."
+    assert walk.pass_s(0.2).trial.failure is Failure.FROZEN
 
 
 def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle() -> None:
@@ -222,7 +211,6 @@ def test_land_is_not_repeated_while_the_newest_heartbeat_tells_of_a_pilot(state:
         walk.pass_s(STEP_S)
     assert len(walk.when(Action.LAND)) == told
     assert walk.state is State.QUARANTINE
-    assert walk.trial.why.count("The vehicle entered mode 64.") == 1
 
 
 def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> None:
@@ -242,7 +230,6 @@ def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> N
     walk.mode = "4"
     walk.pass_s(1.0)
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
-    assert walk.trial.why == "One heartbeat reported mode 64."
     walk.through(State.RECORD)
     walk.touch_down().disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
@@ -309,7 +296,6 @@ def test_a_vehicle_whose_second_source_differs_before_the_command_gets_no_take_o
     while walk.state is State.ARM:
         watched(walk, STEP_S, off_m=1.0 if walk.trial.armed_s is not None else 0.0)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.DISAGREEMENT)
-    assert walk.trial.why == "They were 1.00 m apart before the takeoff command."
 
 
 PX4 = with_autopilot(
@@ -343,7 +329,6 @@ def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -
     walk.climb_rate_m_s, walk.mode = 0.0, "hold"
     walk.pass_s(2.1)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "The vehicle entered mode hold before it had climbed."
 
 
 def test_a_vehicle_that_hovers_near_its_set_point_has_climbed_however_it_swings() -> None:

@@ -170,7 +170,6 @@ def test_a_vehicle_whose_altitude_rose_before_the_command_gets_no_take_off() -> 
     rise(walk)
     walk.through(State.ARM)
     assert walk.trial.failure is Failure.LOST_POSITION
-    assert walk.trial.why == "Its altitude changed by +0.40 m before the takeoff command, and it may have moved."
     walk.pass_s(0.5)
     assert Action.TAKE_OFF not in walk.actions
     assert walk.actions[-1] is Action.LAND, "it may be in the air"
@@ -456,7 +455,6 @@ def test_a_lost_link_repeats_land_every_second_and_never_stops_the_motors() -> N
     assert Action.MOTORS_OFF not in walk.actions
     walk.pass_s(50.0)
     assert walk.state is State.QUARANTINE
-    assert walk.trial.why == "Nothing was received for more than 1 s. The link stayed lost for 60 s."
     assert Action.MOTORS_OFF not in walk.actions
 
 
@@ -549,7 +547,6 @@ def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motor
         walk.pass_s(STEP_S)
     walk.altitude_m, walk.climb_rate_m_s = ground_m, 0.0
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
-    assert walk.trial.why == "According to its climb rate it rose 0.5 m more than its altitude shows."
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
@@ -564,13 +561,12 @@ def test_motors_are_not_stopped_by_position_alone_if_it_was_never_seen_in_the_ai
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
 
 
-def test_a_refused_arming_disarms_restores_the_gains_and_gives_the_reason() -> None:
+def test_a_refused_arming_disarms_and_restores_the_gains() -> None:
     walk = arming()
     walk.give(ActionRefused(Action.ARM, "The vehicle refused to arm (result 4, failed).", walk.now_s))
     assert (walk.state, walk.actions) == (State.DISARM, [Action.ARM, Action.MOTORS_OFF])
     walk.disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "refused")
-    assert walk.trial.why == "The vehicle refused to arm (result 4, failed)."
 
 
 def test_a_vehicle_that_does_not_report_armed_is_not_flown() -> None:
@@ -605,14 +601,11 @@ def test_a_quarantine_also_lists_later_concerns() -> None:
     walk = aborting()
     reboot(walk)
     walk.touch_down()
-    assert (walk.state, walk.trial.why) == (
-        State.QUARANTINE,
-        "The battery voltage was low: 10.0 V. The vehicle rebooted.",
-    )
+    assert (walk.state, len(walk.trial.remarks)) == (State.QUARANTINE, 2)
     walk = recording()
     reboot(walk)
     walk.touch_down()
-    assert (walk.state, walk.trial.why) == (State.QUARANTINE, "The vehicle rebooted.")
+    assert (walk.state, len(walk.trial.remarks)) == (State.QUARANTINE, 1)
 
 
 @pytest.mark.parametrize("befall", [reboot, go_astray, stop_by_itself, be_one_of_two])
@@ -645,7 +638,6 @@ def test_a_record_ends_by_the_grounds_clock_too() -> None:
     walk.tempo = 0.905
     walk.pass_s(33.5)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SLOW_CLOCK)
-    assert walk.trial.why.startswith("Its clock advanced by ")
 
 
 @pytest.mark.complete
@@ -683,7 +675,6 @@ def test_a_gain_that_changes_in_flight_makes_the_flight_invalid() -> None:
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
     walk.hear(Parameter("gui_v_kp", 300.0))
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
-    assert walk.trial.why == "gui_v_kp changed to 300 by a command that was not Gainline's."
     assert walk.pass_s(9.0).state is State.LAND
 
 
@@ -782,8 +773,7 @@ def test_a_vehicle_that_falls_is_recorded_so_and_left_for_a_person_to_look_at() 
     press_abort(walk)
     walk.climb(-3.5, for_s=0.8)
     walk.touch_down().disarm().restore()
-    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.OPERATOR)
-    assert walk.trial.why == f"{ABORT} It hit the ground at 3.5 m/s."
+    assert (walk.state, walk.trial.failure, walk.trial.contact) == (State.QUARANTINE, Failure.OPERATOR, "fell")
 
 
 def test_after_a_person_has_taken_over_nothing_more_is_sent() -> None:
@@ -828,7 +818,7 @@ def test_glitches_do_not_end_a_flight_but_too_many_void_it() -> None:
     assert walk.states[-1] is State.RECORD
     walk.through(State.RECORD)
     assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.LAND, Failure.GLITCHES, "invalid")
-    assert walk.trial.why == "4 samples were dropped."
+    assert walk.trial.watch.positions.glitches == 4
 
 
 def test_a_vehicle_that_comes_down_by_itself_is_not_left_to_wind_up_its_integrator() -> None:
@@ -839,7 +829,7 @@ def test_a_vehicle_that_comes_down_by_itself_is_not_left_to_wind_up_its_integrat
     walk.climb_rate_m_s = 0.0
     assert walk.pass_s(0.9).state is State.RECORD
     assert walk.pass_s(0.2).state is State.ABORT_LAND
-    assert (walk.trial.failure, walk.trial.why) == (Failure.ENVELOPE, "It descended to the ground by itself.")
+    assert walk.trial.failure is Failure.ENVELOPE
 
 
 def test_an_altitude_that_drifts_up_does_not_hide_that_the_vehicle_has_landed_and_disarmed() -> None:
@@ -877,7 +867,6 @@ def test_a_clock_that_steps_ahead_by_more_than_a_latency_ends_the_flight(by_s: f
     walk.boot_s += by_s
     walk.pass_s(0.5)
     assert walk.trial.failure is failure
-    assert walk.trial.why == (f"Its clock jumped {'ahead by 1.0' if by_s == 1.0 else 'by +3.0'} s." if failure else "")
 
 
 def test_the_clock_may_begin_again_after_49_7_days() -> None:
@@ -895,7 +884,6 @@ def test_a_mode_that_heartbeats_do_not_show_is_asked_for_and_two_replies_end_the
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
     walk.hear(Parameter("aut_mod", 2.0)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "The vehicle entered mode home."
 
 
 def test_an_attitude_that_swings_by_8_degrees_rms_exceeds_no_limit() -> None:
