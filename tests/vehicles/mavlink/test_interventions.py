@@ -109,8 +109,7 @@ def test_a_request_has_ended_the_flight_although_a_limit_is_exceeded_then() -> N
 
 def test_a_flight_plan_that_lands_at_its_own_altitude_limit_counts_against_the_gains() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
+    walk.does(1.4, climb_rate_m_s=1.0).hear(BlockEntered(LAND_BLOCK))
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
     assert walk.gains_sent[0] == walk.plan.safe_gains[0]
 
@@ -132,18 +131,13 @@ def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
 
 
 def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
-    walk = TrialDriver(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
-    walk.mode = "land"
-    walk.pass_s(1.6)
+    walk = TrialDriver(plan=COPTER, mode="guided").lift_off().pass_s(1.0).does(1.6, mode="land")
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
 
 
 def test_the_mode_of_the_landing_before_is_no_landing() -> None:
-    walk = TrialDriver(plan=COPTER, mode="land").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(0.8)
-    walk.mode = "guided"
-    walk.pass_s(2.0)
+    walk = TrialDriver(plan=COPTER, mode="land").arm().does(0.8, climb_rate_m_s=1.0)
+    walk.does(2.0, mode="guided")
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
 
 
@@ -217,8 +211,7 @@ def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> Non
     walk = TrialDriver().lift_off()
     while walk.boot_s < (walk.trial.commanded_boot_s or 0.0) + PLAN.record_s - 0.2:
         walk.pass_s(STEP_S)
-    walk.mode = "64"
-    walk.pass_s(2.0)
+    walk.does(2.0, mode="64")
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
     assert Action.LAND not in walk.actions
     assert end_of(walk.trial).gains_left is GainsLeft.FLIGHT
@@ -226,9 +219,7 @@ def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> Non
 
 def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> None:
     """Seen: a pilot stopped the climb at half a metre for a second, and the flight counted."""
-    walk = heartbeat_of_a_pilot(TrialDriver().lift_off().pass_s(0.5))
-    walk.mode = "4"
-    walk.pass_s(1.0)
+    walk = heartbeat_of_a_pilot(TrialDriver().lift_off().pass_s(0.5)).does(1.0, mode="4")
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
     walk.through(State.RECORD)
     walk.touch_down().disarm().restore()
@@ -237,10 +228,7 @@ def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> N
 
 def test_the_mode_from_before_the_command_and_one_heartbeat_after_it_are_no_pilot() -> None:
     """Seen: a PX4, which arms in a mode of a pilot, was left alone after one heartbeat."""
-    walk = TrialDriver(mode="64").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.mode = "64"
-    walk.pass_s(1.3)
+    walk = TrialDriver(mode="64").arm().does(1.3, climb_rate_m_s=1.0, mode="64")
     assert walk.state is State.RECORD
     walk.pass_s(1.3)
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
@@ -266,8 +254,7 @@ def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
     walk.climb(1.0, for_s=0.4)
     while walk.state is not State.ABORT_LAND or not walk.when(Action.LAND):
         walk.pass_s(STEP_S)
-    walk.mode = "land"
-    walk.pass_s(1.0)
+    walk.does(1.0, mode="land")
     heartbeat_of_a_pilot(walk)
     told = len(walk.when(Action.LAND))
     walk.pass_s(1.1)
@@ -276,16 +263,13 @@ def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
 
 def test_a_pilot_who_took_a_vehicle_on_the_ground_and_brings_back_its_first_mode_has_it() -> None:
     walk = TrialDriver(mode="64", plan=with_autopilot(lift_off_s=8.0)).arm().pass_s(2.0)
-    walk.mode = "4"
-    walk.pass_s(1.1)
+    walk.does(1.1, mode="4")
     heartbeat_of_a_pilot(walk).pass_s(1.1)
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
 
 
 def test_a_pilot_who_takes_a_vehicle_on_the_ground_has_it() -> None:
-    walk = TrialDriver(plan=with_autopilot(lift_off_s=4.0)).arm()
-    walk.mode = "64"
-    walk.pass_s(2.6)
+    walk = TrialDriver(plan=with_autopilot(lift_off_s=4.0)).arm().does(2.6, mode="64")
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
 
 
@@ -311,8 +295,7 @@ def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_reco
 ) -> None:
     """Seen: between two heartbeats an ArduCopter was set to Guided again at 0.19 m, where it hovered to the end."""
     walk = TrialDriver(plan=with_autopilot(climbs_from_ground=True)).arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(reached_m)
+    walk.does(reached_m, climb_rate_m_s=1.0)
     walk.climb_rate_m_s = 0.0
     while walk.state is not State.LAND:
         walk.pass_s(STEP_S)
@@ -323,18 +306,13 @@ def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_reco
 
 def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -> None:
     """Seen: a pilot let go of a PX4 at 0.3 m; there it hovered through its whole record, and the flight counted."""
-    walk = TrialDriver(plan=PX4, mode="take-off").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(1.0)
-    walk.climb_rate_m_s, walk.mode = 0.0, "hold"
-    walk.pass_s(2.1)
+    walk = TrialDriver(plan=PX4, mode="take-off").arm().does(1.0, climb_rate_m_s=1.0)
+    walk.does(2.1, climb_rate_m_s=0.0, mode="hold")
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
 
 
 def test_a_vehicle_that_hovers_near_its_set_point_has_climbed_however_it_swings() -> None:
-    walk = TrialDriver(plan=PX4, mode="take-off").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(2.2)
+    walk = TrialDriver(plan=PX4, mode="take-off").arm().does(2.2, climb_rate_m_s=1.0)
     walk.mode = "hold"
     walk.climb(-0.8, for_s=1.5)
     walk.pass_s(1.5)

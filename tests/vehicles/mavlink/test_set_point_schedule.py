@@ -92,8 +92,7 @@ def hovering(until_s: float = 5.0, *, unheard: bool = False) -> Stepping:
 def climbing() -> Stepping:
     walk = Stepping(plan=STEPS)
     walk.arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(1.0)
+    walk.does(1.0, climb_rate_m_s=1.0)
     walk.climb_rate_m_s = 0.0
     return walk
 
@@ -150,8 +149,7 @@ def test_steps_that_overshoot_by_a_third_are_no_oscillation_and_further_crossing
     assert (walk.state, walk.trial.watch.envelope.crossings) == (State.RECORD, 0)
     walk.until_s(14.0)
     for number in range(6):
-        walk.wanted_m = 2.0 + (-0.35 if number % 2 == 0 else 0.35)
-        walk.pass_s(0.7)
+        walk.does(0.7, wanted_m=2.0 + (-0.35 if number % 2 == 0 else 0.35))
     assert walk.trial.failure is Failure.ENVELOPE
     assert walk.trial.watch.envelope.crossings >= 4
 
@@ -356,8 +354,7 @@ def test_a_pilot_who_takes_over_while_it_is_commanded_to_hold_is_not_overridden(
     while WithdrawSetPoint() not in [command for _, command in walk.told]:
         walk.pass_s(STEP_S)
     assert walk.state is State.RECORD
-    walk.mode = LOITER if gives_back else "3.0"
-    walk.pass_s(1.1)
+    walk.does(1.1, mode=LOITER if gives_back else "3.0")
     given_up = (State.ABORT_LAND, Failure.INTERRUPTED) if gives_back else (State.QUARANTINE, Failure.TAKEN_OVER)
     assert (walk.state, walk.trial.failure) == given_up
     walk.give(ActionDone(Action.HOLD, walk.now_s, (walk.now_s - 0.1,), walk.now_s))
