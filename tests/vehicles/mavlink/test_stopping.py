@@ -171,7 +171,7 @@ def test_under_the_plan_of_before_a_fall_is_noticed_and_recorded(at_s: float, fa
         assert (rig.impact_m_s > HARD_M_S, record.end.landed is Landing.FELL) == (falls, falls)
         assert bool(vehicle.concern) == falls
         if falls:
-            with pytest.raises(SafeGainsError):
+            with pytest.raises(SafeGainsError, match=re.escape(record.end.remarks[0])):
                 vehicle.stage(TUNED)
 
 

@@ -19,7 +19,7 @@ from tests.vehicles.mavlink.monitors.observing import watch_of
 from tests.vehicles.mavlink.monitors.test_second_source import seen
 from tests.vehicles.mavlink.monitors.test_settings import reported
 from tests.vehicles.mavlink.test_interventions import COPTER, PX4
-from tests.vehicles.mavlink.test_set_point_schedule import STEPS, Stepping, climbing, hovering
+from tests.vehicles.mavlink.test_set_point_schedule import STEPS, Stepping, climbing, hovering, unconfirmed
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, TrialDriver
 
 W, AT, GUIDED = watch_of(3.0), Position(10.0, 3.0, 0.0), frozenset({"guided"})
@@ -111,10 +111,15 @@ def late() -> TrialDriver:
 
 FLOWN: dict[str, Callable[[], TrialDriver]] = {
     "F3 It refused to arm.": lambda: befall.arming().give(ActionRefused(Action.ARM, "It refused to arm.", 0.0)),
+    "F5 Nothing was received for more than 1 s. The link stayed lost for 60 s.": lambda: befall.lost().pass_s(60.0),
+    "F5 Nothing was received for more than 1 s. The vehicle entered mode 64.": lambda: befall.lost().does(
+        2.1, mute=False, mode="64"
+    ),
     "F6 It descended to the ground by itself.": lambda: befall.recording().climb(-2.0, for_s=1.44).pass_s(1.2),
     "F9e Its clock advanced by 32.6 s in 36.0 s.": lambda: (
         TrialDriver(replace(PLAN, record_s=33.0), tempo=0.905).lift_off().pass_s(33.5)
     ),
+    "F14a It refused.": lambda: unconfirmed().give(ActionRefused(Action.FLY_TO, "It refused.", 0.0)),
     "F14a The set point of 6 s was not confirmed in time.": lambda: hovering(10.0, unheard=True),
     "F14a A set point took effect 1.6 s late.": late,
     "F14a The record ended without 1 set point.": lambda: (

@@ -89,6 +89,6 @@ def test_the_source_is_let_go_when_the_vehicle_cannot_be_opened() -> None:
     mocap = natnet(free_port())
     with UdpRig(mocap=mocap) as rig:
         options = {**rig.options(second_source=mocap), "system_id": 99.0}
-        with pytest.raises(VehicleError, match="No heartbeat was received"):
+        with pytest.raises(VehicleError):
             MAVLINK.open(options, SAFE, None)
         assert not any(thread.name.startswith("natnet:") for thread in threading.enumerate())
