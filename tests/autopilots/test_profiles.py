@@ -335,9 +335,8 @@ def test_modes_are_told_apart() -> None:
 def test_a_command_under_way_is_no_answer_yet() -> None:
     assert heard(PX4, "COMMAND_ACK", command=400, result=5) is None
     assert heard(PX4, "COMMAND_ACK", command=400, result=0) == CommandReply("command 400", True, "result 0, accepted")
-    assert heard(ARDUPILOT, "COMMAND_ACK", command=400, result=4) == CommandReply(
-        "command 400", False, "result 4, failed"
-    )
+    for result, why in ((1, "result 1, temporarily rejected"), (4, "result 4, failed")):
+        assert heard(ARDUPILOT, "COMMAND_ACK", command=400, result=result) == CommandReply("command 400", False, why)
 
 
 def test_a_breached_fence_is_reported() -> None:

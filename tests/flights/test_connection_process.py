@@ -166,7 +166,6 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     process._fly(flight_of(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
-    assert "did not arm" in trouble.what
     assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
     assert (trouble.not_flown, trouble.unsafe) == (True, not takes_its_safe_gains)
     assert [type(said) for said in line.said if isinstance(said, SafeGainsRestored | FlightFinished)] == (

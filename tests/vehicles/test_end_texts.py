@@ -24,6 +24,8 @@ def aborted(
     [
         (FlightEnd(), ""),
         (FlightEnd(remarks=("2 samples jumped and were dropped.",)), "2 samples jumped and were dropped."),
+        (FlightEnd(failure=Failure.NO_HEARTBEAT), "No heartbeat was received; nothing was sent."),
+        (FlightEnd(failure=Failure.NOT_ARMED), "The vehicle did not arm."),
         (LIMIT, "A safety limit was exceeded. It rose to 4.6 m."),
         (FlightEnd(failure=Failure.BATTERY, remarks=("It was 9.0 V.",)), "It was 9.0 V."),
         (aborted(StopRequest()), "aborted by the operator"),

@@ -174,7 +174,7 @@ def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_s
     assert trust(client, campaign) == 1.0
 
 
-def test_an_abort_is_reported_once_without_repeating_the_word_and_whether_it_counts(
+def test_the_texts_of_an_abort_name_it_once_and_tell_whether_it_counts(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
     trial = aborted(client, database, campaign, on_request=True)
@@ -191,7 +191,7 @@ def test_an_abort_is_reported_once_without_repeating_the_word_and_whether_it_cou
 
 
 @pytest.mark.complete
-def test_an_aborted_flight_that_is_marked_invalid_stays_an_abort_in_the_report(
+def test_the_texts_of_an_aborted_flight_that_is_marked_invalid_still_name_the_abort(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
     trial = aborted(client, database, campaign, on_request=True)

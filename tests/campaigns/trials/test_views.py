@@ -78,7 +78,7 @@ def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_th
     assert ("best before" in {one["against"] for one in third["comparisons"]}) is not same
 
 
-def test_the_sentence_about_a_doubtful_flight_has_one_full_stop_after_its_reason() -> None:
+def test_the_text_about_a_doubtful_flight_has_one_full_stop_after_its_reason() -> None:
     end = FlightEnd(failure=Failure.LOST_POSITION, remarks=("None of its positions was plausible for 0.5 s.",))
     row = TrialRow(number=1, state=TrialState.CAPTURED, reason="", ending="invalid", end=end, glitches=[])
     assert verdict(row, ReferenceFlights([], Scatter(0.01, 1.0)), "m") == (

@@ -78,8 +78,7 @@ def test_a_packet_out_of_order_changes_nothing() -> None:
 
 def hops(walk: TrialDriver) -> None:
     """Lower than what counts as lifted off."""
-    walk.climb_rate_m_s = 0.4
-    walk.pass_s(0.2)
+    walk.does(0.2, climb_rate_m_s=0.4)
     walk.climb(-0.4, for_s=0.2)
     assert not walk.trial.watch.climb.lifted
 
@@ -93,8 +92,7 @@ def climbs_at_an_altitude_that_stands_still(walk: TrialDriver) -> None:
 
 def says_that_it_flies(walk: TrialDriver) -> None:
     """All its positions show the ground."""
-    walk.landed = False
-    walk.pass_s(0.1)
+    walk.does(0.1, landed=False)
     walk.landed = None
 
 
@@ -105,14 +103,12 @@ def is_seen_in_the_air_by_the_second_source(walk: TrialDriver) -> None:
 
 
 def loses_its_altitude(walk: TrialDriver) -> None:
-    walk.blind = True
-    walk.pass_s(0.6)
+    walk.does(0.6, blind=True)
     walk.blind = False
 
 
 def loses_its_link(walk: TrialDriver) -> None:
-    walk.mute = True
-    walk.pass_s(0.6)
+    walk.does(0.6, mute=True)
     walk.mute = False
 
 

@@ -6,7 +6,7 @@ from app.autopilots.commands import Action, Target
 from app.autopilots.measurements import CommandReply, Heartbeat, Measurement
 from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.mavlink.command_sequence import CommandSequence
-from app.vehicles.mavlink.events import ActionDone, PacketReceived
+from app.vehicles.mavlink.events import ActionDone, ActionRefused, PacketReceived
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.radio import AutopilotLink
 from tests.clocks import SimulatedClock
@@ -61,3 +61,15 @@ def test_offboard_is_requested_only_right_after_a_heartbeat_that_reports_hold() 
     assert [commanded.second(HOLD), commanded.second(), commanded.second(HOLD)] == [1, 0, 1]
     assert [commanded.second(OFFBOARD), commanded.second(OFFBOARD)] == [0, 0], "though the reply was lost"
     assert commanded.sent[-1] == "SET_POSITION_TARGET_LOCAL_NED"
+
+
+def test_the_texts_of_a_refusal_and_of_no_reply() -> None:
+    armed, ignored = Commanded("ardupilot", Action.ARM), Commanded("paparazzi", Action.FLY_TO)
+    reply = CommandReply("command 176", accepted=False, why="result 4, failed")
+    refused = armed.sequence.proceed([PacketReceived(reply, armed.clock.now_s())])
+    while (unanswered := ignored.sequence.proceed([])) is None:
+        ignored.clock.wait_s(0.1)
+    assert [each.why for each in (refused, unanswered) if isinstance(each, ActionRefused)] == [
+        "The vehicle refused to arm (result 4, failed).",
+        "The vehicle did not reply to the command to fly to its next set point.",
+    ]

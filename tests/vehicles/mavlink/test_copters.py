@@ -276,7 +276,7 @@ def test_what_a_refused_run_had_set_is_put_back_too() -> None:
             vehicle.stage(SAFE["px4"])
             rig.drone.autopilot.refuses_arming = True
             rig.drone.autopilot.prearm_failure = lambda: None  # type: ignore[attr-defined]  # it does not tell before
-            with pytest.raises(VehicleError, match="refused to arm") as refusal:
+            with pytest.raises(VehicleError) as refusal:
                 vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
             assert refusal.value.not_flown
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5

@@ -140,8 +140,7 @@ def test_a_heartbeat_in_home_mode_is_a_separate_finding() -> None:
     make = old_plan(max_distance_m=4.0, sends_mode=True)
     with LockstepRig(make=make, faults=["carried-away:3@8"]) as rig, connected(rig) as vehicle:
         record = fly(vehicle)
-        assert record.ending == "invalid"
-        assert "The vehicle entered mode Home: it flies back by itself and ignores Land" in record.reason
+        assert (record.ending, record.end.failure) == ("invalid", "F10b")
         assert vehicle.condition().mode == "Home"
 
 

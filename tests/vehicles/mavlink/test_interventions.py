@@ -109,10 +109,8 @@ def test_a_request_has_ended_the_flight_although_a_limit_is_exceeded_then() -> N
 
 def test_a_flight_plan_that_lands_at_its_own_altitude_limit_counts_against_the_gains() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
+    walk.does(1.4, climb_rate_m_s=1.0).hear(BlockEntered(LAND_BLOCK))
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
-    assert "Its flight plan entered the block “land”." in walk.trial.why
     assert walk.gains_sent[0] == walk.plan.safe_gains[0]
 
 
@@ -120,7 +118,6 @@ def test_a_flight_plan_that_changes_block_by_itself_gets_land() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "Its flight plan entered the block “Standby”."
     assert walk.actions[-1] is Action.LAND
 
 
@@ -134,22 +131,13 @@ def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
 
 
 def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
-    walk = TrialDriver(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
-    walk.mode = "land"
-    walk.pass_s(1.6)
-    assert (walk.state, walk.trial.failure, walk.trial.why) == (
-        State.ABORT_LAND,
-        Failure.OWN_LANDING,
-        "It entered mode land.",
-    )
+    walk = TrialDriver(plan=COPTER, mode="guided").lift_off().pass_s(1.0).does(1.6, mode="land")
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
 
 
 def test_the_mode_of_the_landing_before_is_no_landing() -> None:
-    walk = TrialDriver(plan=COPTER, mode="land").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(0.8)
-    walk.mode = "guided"
-    walk.pass_s(2.0)
+    walk = TrialDriver(plan=COPTER, mode="land").arm().does(0.8, climb_rate_m_s=1.0)
+    walk.does(2.0, mode="guided")
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
 
 
@@ -170,7 +158,6 @@ def test_two_sources_that_disagree_for_a_third_of_a_second_land_the_vehicle() ->
     assert walk.state is State.RECORD
     watched(walk, 0.1, off_m=0.35)
     assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.DISAGREEMENT, "invalid")
-    assert walk.trial.why == "They were 0.35 m apart; more than 0.3 m for 0.3 s is not allowed."
     assert walk.gains_sent == []
 
 
@@ -181,18 +168,14 @@ def test_a_short_disagreement_and_a_small_one_are_borne() -> None:
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
 
 
-def test_a_second_source_that_loses_the_vehicle_lands_it() -> None:
+def test_a_second_source_that_loses_the_vehicle_or_falls_silent_for_a_second_lands_it() -> None:
     walk = watched(hovering(), 0.24, is_new=False)
     assert walk.state is State.RECORD
     watched(walk, 0.06, is_new=False)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
-    assert walk.trial.why == "The second source of altitude did not track it for more than 0.25 s."
-
-
-def test_a_second_source_that_falls_silent_lands_it_after_a_second() -> None:
     walk = hovering().pass_s(0.9)
     assert walk.state is State.RECORD
-    assert walk.pass_s(0.2).trial.why == "Nothing was received from the second source of altitude for 1 s."
+    assert walk.pass_s(0.2).trial.failure is Failure.FROZEN
 
 
 def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle() -> None:
@@ -222,15 +205,13 @@ def test_land_is_not_repeated_while_the_newest_heartbeat_tells_of_a_pilot(state:
         walk.pass_s(STEP_S)
     assert len(walk.when(Action.LAND)) == told
     assert walk.state is State.QUARANTINE
-    assert walk.trial.why.count("The vehicle entered mode 64.") == 1
 
 
 def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> None:
     walk = TrialDriver().lift_off()
     while walk.boot_s < (walk.trial.commanded_boot_s or 0.0) + PLAN.record_s - 0.2:
         walk.pass_s(STEP_S)
-    walk.mode = "64"
-    walk.pass_s(2.0)
+    walk.does(2.0, mode="64")
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
     assert Action.LAND not in walk.actions
     assert end_of(walk.trial).gains_left is GainsLeft.FLIGHT
@@ -238,11 +219,8 @@ def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> Non
 
 def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> None:
     """Seen: a pilot stopped the climb at half a metre for a second, and the flight counted."""
-    walk = heartbeat_of_a_pilot(TrialDriver().lift_off().pass_s(0.5))
-    walk.mode = "4"
-    walk.pass_s(1.0)
+    walk = heartbeat_of_a_pilot(TrialDriver().lift_off().pass_s(0.5)).does(1.0, mode="4")
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
-    assert walk.trial.why == "One heartbeat reported mode 64."
     walk.through(State.RECORD)
     walk.touch_down().disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
@@ -250,10 +228,7 @@ def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> N
 
 def test_the_mode_from_before_the_command_and_one_heartbeat_after_it_are_no_pilot() -> None:
     """Seen: a PX4, which arms in a mode of a pilot, was left alone after one heartbeat."""
-    walk = TrialDriver(mode="64").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.mode = "64"
-    walk.pass_s(1.3)
+    walk = TrialDriver(mode="64").arm().does(1.3, climb_rate_m_s=1.0, mode="64")
     assert walk.state is State.RECORD
     walk.pass_s(1.3)
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
@@ -279,8 +254,7 @@ def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
     walk.climb(1.0, for_s=0.4)
     while walk.state is not State.ABORT_LAND or not walk.when(Action.LAND):
         walk.pass_s(STEP_S)
-    walk.mode = "land"
-    walk.pass_s(1.0)
+    walk.does(1.0, mode="land")
     heartbeat_of_a_pilot(walk)
     told = len(walk.when(Action.LAND))
     walk.pass_s(1.1)
@@ -289,16 +263,13 @@ def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
 
 def test_a_pilot_who_took_a_vehicle_on_the_ground_and_brings_back_its_first_mode_has_it() -> None:
     walk = TrialDriver(mode="64", plan=with_autopilot(lift_off_s=8.0)).arm().pass_s(2.0)
-    walk.mode = "4"
-    walk.pass_s(1.1)
+    walk.does(1.1, mode="4")
     heartbeat_of_a_pilot(walk).pass_s(1.1)
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
 
 
 def test_a_pilot_who_takes_a_vehicle_on_the_ground_has_it() -> None:
-    walk = TrialDriver(plan=with_autopilot(lift_off_s=4.0)).arm()
-    walk.mode = "64"
-    walk.pass_s(2.6)
+    walk = TrialDriver(plan=with_autopilot(lift_off_s=4.0)).arm().does(2.6, mode="64")
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
 
 
@@ -309,7 +280,6 @@ def test_a_vehicle_whose_second_source_differs_before_the_command_gets_no_take_o
     while walk.state is State.ARM:
         watched(walk, STEP_S, off_m=1.0 if walk.trial.armed_s is not None else 0.0)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.DISAGREEMENT)
-    assert walk.trial.why == "They were 1.00 m apart before the takeoff command."
 
 
 PX4 = with_autopilot(
@@ -325,8 +295,7 @@ def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_reco
 ) -> None:
     """Seen: between two heartbeats an ArduCopter was set to Guided again at 0.19 m, where it hovered to the end."""
     walk = TrialDriver(plan=with_autopilot(climbs_from_ground=True)).arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(reached_m)
+    walk.does(reached_m, climb_rate_m_s=1.0)
     walk.climb_rate_m_s = 0.0
     while walk.state is not State.LAND:
         walk.pass_s(STEP_S)
@@ -337,19 +306,13 @@ def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_reco
 
 def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -> None:
     """Seen: a pilot let go of a PX4 at 0.3 m; there it hovered through its whole record, and the flight counted."""
-    walk = TrialDriver(plan=PX4, mode="take-off").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(1.0)
-    walk.climb_rate_m_s, walk.mode = 0.0, "hold"
-    walk.pass_s(2.1)
+    walk = TrialDriver(plan=PX4, mode="take-off").arm().does(1.0, climb_rate_m_s=1.0)
+    walk.does(2.1, climb_rate_m_s=0.0, mode="hold")
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "The vehicle entered mode hold before it had climbed."
 
 
 def test_a_vehicle_that_hovers_near_its_set_point_has_climbed_however_it_swings() -> None:
-    walk = TrialDriver(plan=PX4, mode="take-off").arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(2.2)
+    walk = TrialDriver(plan=PX4, mode="take-off").arm().does(2.2, climb_rate_m_s=1.0)
     walk.mode = "hold"
     walk.climb(-0.8, for_s=1.5)
     walk.pass_s(1.5)

@@ -1,6 +1,6 @@
 from app.autopilots.measurements import Battery, Heartbeat
 from app.vehicles.mavlink import observation as watching
-from tests.vehicles.mavlink.monitors.observing import told, watch_of
+from tests.vehicles.mavlink.monitors.observing import failure_of, told, watch_of
 from tests.vehicles.mavlink.walking import PLAN
 
 
@@ -17,9 +17,6 @@ def test_a_hover_keeps_every_limit() -> None:
 def test_what_is_found_before_a_take_off_is_the_most_severe_of_several() -> None:
     """A second vehicle under its id explains a lost link, and not the other way round."""
     silent = watch_of(0.1)
-    lost = watching.find_on_ground(silent, PLAN, 20.0)
-    assert lost is not None
-    assert lost.failure == "F5"
-    duplicate = watching.find_on_ground(watching.note_duplicate(silent, "Two clocks."), PLAN, 20.0)
-    assert duplicate is not None
-    assert (duplicate.failure, duplicate.why) == ("F12", "Two clocks.")
+    assert failure_of(watching.find_on_ground(silent, PLAN, 20.0)) == "F5"
+    duplicate = watching.note_duplicate(silent, "Two clocks.")
+    assert failure_of(watching.find_on_ground(duplicate, PLAN, 20.0)) == "F12"

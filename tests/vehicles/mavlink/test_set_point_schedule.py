@@ -92,8 +92,7 @@ def hovering(until_s: float = 5.0, *, unheard: bool = False) -> Stepping:
 def climbing() -> Stepping:
     walk = Stepping(plan=STEPS)
     walk.arm()
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(1.0)
+    walk.does(1.0, climb_rate_m_s=1.0)
     walk.climb_rate_m_s = 0.0
     return walk
 
@@ -150,10 +149,9 @@ def test_steps_that_overshoot_by_a_third_are_no_oscillation_and_further_crossing
     assert (walk.state, walk.trial.watch.envelope.crossings) == (State.RECORD, 0)
     walk.until_s(14.0)
     for number in range(6):
-        walk.wanted_m = 2.0 + (-0.35 if number % 2 == 0 else 0.35)
-        walk.pass_s(0.7)
+        walk.does(0.7, wanted_m=2.0 + (-0.35 if number % 2 == 0 else 0.35))
     assert walk.trial.failure is Failure.ENVELOPE
-    assert "It crossed its set point 4 times" in walk.trial.why
+    assert walk.trial.watch.envelope.crossings >= 4
 
 
 def land_by_itself(walk: TrialDriver) -> None:
@@ -203,12 +201,11 @@ def test_every_failure_in_every_phase_leads_where_it_must_and_no_set_point_follo
 
 
 def test_a_set_point_that_is_refused_or_never_confirmed_lands_the_vehicle() -> None:
-    for why in ("The vehicle refused it.", "The vehicle did not reply."):
-        walk = unconfirmed()
-        walk.give(ActionRefused(Action.FLY_TO, why, walk.now_s))
-        assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.SET_POINT, "invalid")
-        assert (walk.trial.why, walk.actions[-1], walk.gains_sent) == (why, Action.LAND, [])
-        assert walk.pass_s(8.0).altitudes == [2.0]
+    walk = unconfirmed()
+    walk.give(ActionRefused(Action.FLY_TO, "Refused, or never replied to.", walk.now_s))
+    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.SET_POINT, "invalid")
+    assert (walk.actions[-1], walk.gains_sent) == (Action.LAND, [])
+    assert walk.pass_s(8.0).altitudes == [2.0]
 
 
 def test_a_set_point_that_is_not_confirmed_in_time_ends_the_flight_and_no_other_is_commanded() -> None:
@@ -216,15 +213,14 @@ def test_a_set_point_that_is_not_confirmed_in_time_ends_the_flight_and_no_other_
     assert (walk.altitudes, walk.state) == ([2.0], State.RECORD)
     walk.until_s(10.0)
     assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.SET_POINT, [2.0])
-    assert walk.trial.why == "The set point of 6 s was not confirmed in time."
 
 
 def test_a_set_point_that_took_effect_late_ends_the_flight() -> None:
-    for late_s, why in ((1.4, ""), (1.6, "A set point took effect 1.6 s late.")):
+    for late_s, failure in ((1.4, None), (1.6, Failure.SET_POINT)):
         walk = hovering(7.6, unheard=True)
         sent_s = walk.when(Action.FLY_TO)[0]
         walk.give(ActionDone(Action.FLY_TO, walk.now_s, (sent_s,), sent_s + late_s))
-        assert (walk.trial.failure, walk.trial.why) == (Failure.SET_POINT if why else None, why)
+        assert walk.trial.failure is failure
 
 
 def test_a_record_that_ends_without_all_its_steps_does_not_count() -> None:
@@ -234,7 +230,6 @@ def test_a_record_that_ends_without_all_its_steps_does_not_count() -> None:
     walk.unheard = True
     walk.until_s(12.6)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SET_POINT)
-    assert walk.trial.why == "The record ended without 1 set point."
 
 
 def test_a_flight_that_a_pilot_interrupted_gets_no_further_set_point() -> None:
@@ -263,7 +258,6 @@ def test_a_stream_that_paused_lands_the_vehicle_unless_a_pilot_may_be_flying() -
     walk = hovering(7.0)
     walk.give(SetPointsPaused(0.8, walk.now_s))
     assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.PAUSED, "invalid")
-    assert walk.trial.why == "Gainline stalled, and sent no set point for 0.8 s."
     walk = hovering(7.0)
     walk.hear(Heartbeat(9, armed=True, mode="64"))
     walk.give(SetPointsPaused(0.8, walk.now_s))
@@ -279,17 +273,13 @@ def test_a_set_point_whose_message_was_repeated_may_have_taken_effect_at_each_se
     assert change.times_s == pytest.approx((6.1, 6.6), abs=0.03)
 
 
-def test_a_vehicle_that_is_not_at_rest_before_the_first_step_is_landed_and_told_why() -> None:
+def test_a_vehicle_that_is_not_at_rest_before_the_first_step_is_landed() -> None:
     walk = hovering(4.0)
     walk.climb_rate_m_s = 0.2
     walk.until_s(6.1)
     assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.NOT_SETTLED, [])
-    assert walk.trial.why.startswith("The vehicle had not settled before the first step, at 6 s: it changed by 0.3")
     assert (walk.gains_sent[0], walk.trial.outcome) == (SAFE_GAINS[0], "invalid")
-    low = climbing()
-    low.until_s(6.1)
-    assert low.trial.failure is Failure.NOT_SETTLED
-    assert low.trial.why == "The vehicle had not reached half of 3 m before the first step, at 6 s."
+    assert climbing().until_s(6.1).trial.failure is Failure.NOT_SETTLED
 
 
 def test_no_set_point_is_commanded_while_a_pilot_may_be_flying() -> None:
@@ -364,8 +354,7 @@ def test_a_pilot_who_takes_over_while_it_is_commanded_to_hold_is_not_overridden(
     while WithdrawSetPoint() not in [command for _, command in walk.told]:
         walk.pass_s(STEP_S)
     assert walk.state is State.RECORD
-    walk.mode = LOITER if gives_back else "3.0"
-    walk.pass_s(1.1)
+    walk.does(1.1, mode=LOITER if gives_back else "3.0")
     given_up = (State.ABORT_LAND, Failure.INTERRUPTED) if gives_back else (State.QUARANTINE, Failure.TAKEN_OVER)
     assert (walk.state, walk.trial.failure) == given_up
     walk.give(ActionDone(Action.HOLD, walk.now_s, (walk.now_s - 0.1,), walk.now_s))

@@ -156,6 +156,14 @@ class TrialDriver:
             self.give(Tick(self.now_s))
         return self
 
+    def does(self, for_s: float, **changes: object) -> Self:
+        """Let it do this from now on, for so long."""
+        for name, value in changes.items():
+            assert hasattr(self, name)
+            setattr(self, name, value)
+        self.pass_s(for_s)
+        return self
+
     def _speak(self) -> None:
         estimated_m = self.altitude_m + _NOISE_M * (self.steps % 2)
         here = Position(round(self.boot_s % WRAP_S, 6), estimated_m, self.climb_rate_m_s, self.north_m)

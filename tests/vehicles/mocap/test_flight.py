@@ -68,8 +68,7 @@ def test_odometry_on_the_vehicle_s_own_link_is_a_second_source_too() -> None:
 @pytest.mark.parametrize("fault", ["mocap-lost@4", "mocap-frozen@4"])
 def test_cameras_that_see_nothing_new_land_the_vehicle_and_void_the_flight(fault: str) -> None:
     record = flown(natnet(free_port()), [fault])
-    assert record.ending == "invalid"
-    assert "The second source of altitude did not track it for more than" in record.reason
+    assert (record.ending, record.end.failure) == ("invalid", "F9a")
     assert "Rigid body 4 of the motion capture at 127.0.0.1 has no samples for" in record.reason
     assert 4.0 < record.trajectory.time_s[-1] < 25.0
 
@@ -90,6 +89,6 @@ def test_the_source_is_let_go_when_the_vehicle_cannot_be_opened() -> None:
     mocap = natnet(free_port())
     with UdpRig(mocap=mocap) as rig:
         options = {**rig.options(second_source=mocap), "system_id": 99.0}
-        with pytest.raises(VehicleError, match="No heartbeat was received"):
+        with pytest.raises(VehicleError):
             MAVLINK.open(options, SAFE, None)
         assert not any(thread.name.startswith("natnet:") for thread in threading.enumerate())

@@ -82,8 +82,9 @@ def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_g
 ) -> None:
     with met(clock, armable=False) as (peer, ours):
         ours.stage(TUNED)
-        with pytest.raises(VehicleError, match="temporarily rejected"):
+        with pytest.raises(VehicleError) as refusal:
             ours.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert refusal.value.not_flown
         assert (peer.flew_with, peer.gains, peer.stands) == ([], SAFE, True)
 
 

@@ -2,10 +2,15 @@
 
 from app.autopilots.measurements import Measurement, Position
 from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.walking import PLAN
 
 START_S = 10.0
+
+
+def failure_of(finding: Finding | None) -> Failure | None:
+    return None if finding is None else finding.failure
 
 
 def watch_of(*altitudes_m: float, every_s: float = 0.02, climb_rate_m_s: float = 0.0) -> TrialObservation:

@@ -4,6 +4,7 @@ import pytest
 
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.monitors.climb import ClimbMonitor
+from tests.vehicles.mavlink.monitors.observing import failure_of
 
 
 def climbed(*positions: Position) -> ClimbMonitor:
@@ -17,9 +18,7 @@ def test_an_altitude_that_stays_while_the_vehicle_climbs_falls_behind_its_climb_
     """1 m/s for 0.6 s."""
     climb = climbed(*(Position(10.0 + 0.1 * count, 0.1, 1.0) for count in range(7)))
     assert climb.behind_m == pytest.approx(0.6)
-    found = climb.find_behind()
-    assert found is not None
-    assert found.failure == "F9d"
+    assert failure_of(climb.find_behind()) == "F9d"
 
 
 def test_a_vehicle_that_was_above_the_ground_is_not_behind_any_more() -> None:

@@ -1,4 +1,5 @@
 from app.vehicles.mavlink.monitors.ground import GroundMonitor
+from tests.vehicles.mavlink.monitors.observing import failure_of
 
 
 def test_a_landing_is_believed_once_it_was_reported_for_a_second_and_still_is() -> None:
@@ -21,6 +22,4 @@ def test_a_vehicle_that_reports_for_8_s_that_it_flies_contradicts_an_altitude_on
     for tenths in range(100, 182):
         ground = ground.update(False, tenths / 10.0).settle(tenths / 10.0, grounded=True, said_to_fly=True)
     assert ground.find_contradiction(18.0) is None
-    found = ground.find_contradiction(18.1)
-    assert found is not None
-    assert found.failure == "F9d"
+    assert failure_of(ground.find_contradiction(18.1)) == "F9d"

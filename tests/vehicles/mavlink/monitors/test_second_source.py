@@ -2,6 +2,7 @@ import pytest
 
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.monitors.second_source import SecondSourceMonitor
+from tests.vehicles.mavlink.monitors.observing import failure_of
 from tests.vehicles.mavlink.walking import PLAN
 
 
@@ -19,8 +20,7 @@ def seen(*samples: tuple[float, float], vehicle_m: float = 3.0, is_new: bool = T
 def test_two_sources_more_than_0_3_m_apart_for_0_3_s_disagree(
     off_m: float, until_s: float, failure: str | None
 ) -> None:
-    finding = seen((10.0, 3.0 + off_m), (until_s, 3.0 + off_m)).find_disagreement()
-    assert (None if finding is None else finding.failure) == failure
+    assert failure_of(seen((10.0, 3.0 + off_m), (until_s, 3.0 + off_m)).find_disagreement()) == failure
 
 
 def test_a_source_that_is_not_tracked_is_blind_after_a_quarter_of_a_second() -> None:

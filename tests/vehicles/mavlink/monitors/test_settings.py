@@ -5,6 +5,7 @@ from app.autopilots.commands import Setting
 from app.autopilots.measurements import Parameter
 from app.vehicles.mavlink.failures import Finding
 from app.vehicles.mavlink.monitors.settings import SettingMonitor
+from tests.vehicles.mavlink.monitors.observing import failure_of
 from tests.vehicles.mavlink.walking import PLAN, with_autopilot
 
 GAINS = (Setting("gui_v_kp", 1600.0),)
@@ -23,10 +24,7 @@ def test_one_report_of_another_value_is_a_suspicion_and_two_are_a_finding() -> N
     other = Parameter("gui_v_kp", 300.0)
     settings, finding = reported(other)
     assert (settings.suspects, finding) == (frozenset({"gui_v_kp"}), None)
-    unconfirmed, confirmed = settings.find_unconfirmed(), reported(other, other)[1]
-    assert unconfirmed is not None
-    assert confirmed is not None
-    assert (unconfirmed.failure, confirmed.failure) == ("F10c", "F10c")
+    assert (failure_of(settings.find_unconfirmed()), failure_of(reported(other, other)[1])) == ("F10c", "F10c")
 
 
 def test_the_right_value_ends_a_suspicion_and_other_parameters_begin_none() -> None:
@@ -36,7 +34,5 @@ def test_the_right_value_ends_a_suspicion_and_other_parameters_begin_none() -> N
 
 
 def test_another_mode_is_found_by_two_reports() -> None:
-    found = reported(Parameter("aut_mod", 2.0), Parameter("aut_mod", 2.0))[1]
-    assert found is not None
-    assert found.failure == "F10b"
+    assert failure_of(reported(Parameter("aut_mod", 2.0), Parameter("aut_mod", 2.0))[1]) == "F10b"
     assert reported(Parameter("aut_mod", 7.0))[0].suspects == frozenset(), "a value that names no mode"
