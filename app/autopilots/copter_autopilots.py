@@ -68,7 +68,7 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
             learned=_LEARNED,
             kept=ardupilot_parameters.LOOP_NAMES,
             usual=_in_flight(
-                *ardupilot_parameters.FIRMWARE_NAMES,
+                *ardupilot_parameters.DEFAULTS,
                 ardupilot_parameters.ACCELEROMETER_FILTER,
                 ardupilot_parameters.LOOP_RATE,
             ),
@@ -89,7 +89,7 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
             required=tuple(px4_loop.SPACE.bounds),
             learned="",
             kept=px4_parameters.LOOP_NAMES,
-            usual=_in_flight(*px4_parameters.FIRMWARE_NAMES, *px4_parameters.ESTIMATOR_NAMES),
+            usual=_in_flight(*px4_parameters.DEFAULTS, *px4_parameters.ESTIMATOR_NAMES),
             shapes_reference=False,
             hint=_ASK.format(
                 mode="Offboard",

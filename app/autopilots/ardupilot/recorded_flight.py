@@ -12,6 +12,7 @@ import numpy as np
 from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.autopilots.ardupilot.replica import parameters as ardupilot_parameters
 from app.autopilots.ardupilot.replica.copter import shaped
+from app.autopilots.ardupilot.replica.vertical import packed
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import Steps, require_channels, segment_of, unanswered, whole_steps
 from app.core.analysis.segment import LEAD_S
@@ -25,7 +26,7 @@ _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
 _LARGEST_MISFIT_M: Final = 0.1
 _RANGES: Final = {
-    **dict.fromkeys(ardupilot_parameters.FIRMWARE_NAMES, PLAUSIBLE),
+    **dict.fromkeys(ardupilot_parameters.DEFAULTS, PLAUSIBLE),
     ardupilot_parameters.LOOP_RATE: ardupilot_parameters.LOOP_RATES_HZ,
     ardupilot_parameters.ACCELEROMETER_FILTER: (0.0, ardupilot_parameters.LOOP_RATES_HZ[1]),
 }
@@ -52,7 +53,7 @@ def shaped_reference(loop: ArduPilotLoop, set_points: SetPoints, steps_s: Sample
     the first of them."""
     references = np.full((len(steps_s), len(REFERENCE)), loop.assumed_hover_throttle)
     targets = set_points.at(steps_s)
-    shaped(loop.parameters.packed(loop.step_s), targets[0], targets, references)
+    shaped(packed(loop.parameters, loop.step_s), targets[0], targets, references)
     return references
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history
 from app.autopilots.ardupilot.replica.parameters import (
-    FIRMWARE_NAMES,
+    DEFAULTS,
     LOOP_RATE,
     LOOP_RATE_HZ,
     LOOP_RATES_HZ,
@@ -49,7 +49,7 @@ def ardupilot_loop_log(recording: Recording, *, name: str) -> LoopLog:
     if not rows.size:
         raise refused("PSCD", "has no row in flight in GUIDED, the mode that the replica computes")
     time_s = columns["altitude_m"].time_s[rows]
-    values = history(recording, frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, LOOP_RATE, _OPTIONS})).at(float(time_s[0]))
+    values = history(recording, frozenset({*DEFAULTS, *UNSUPPORTED, LOOP_RATE, _OPTIONS})).at(float(time_s[0]))
     if "PSC_POSZ_P" not in values:
         raise refused("PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
     rate_hz = values.get(LOOP_RATE, LOOP_RATE_HZ)

@@ -24,7 +24,7 @@ def px4_loop(parameters: Mapping[str, float]) -> Px4Loop:
 
     Raises InputError for one that the replica lacks, or that is outside its range.
     """
-    require_within(parameters, dict.fromkeys(px4_parameters.FIRMWARE_NAMES, PLAUSIBLE))
+    require_within(parameters, dict.fromkeys(px4_parameters.DEFAULTS, PLAUSIBLE))
     given, step_s = px4_parameters.parameters_from(parameters), px4_parameters.estimator_step_s(parameters)
     return Px4Loop(
         parameters=given,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.log import SOURCES, TARGET
-from app.autopilots.px4.replica.parameters import FIRMWARE_NAMES, GAINS, UNSUPPORTED, Parameters, parameters_from
+from app.autopilots.px4.replica.parameters import DEFAULTS, UNSUPPORTED, Parameters, parameters_from
 from app.autopilots.px4.replica.replay import LoopLog
 from app.autopilots.px4.replica.vertical import FLIGHT, HOVER_MAX, HOVER_MIN, RAMP_UP
 from app.autopilots.recording import Recording, refusal
@@ -45,11 +45,11 @@ def px4_loop_log(recording: Recording, *, name: str) -> LoopLog:
     if not rows.size:
         raise refused(TARGET, "has no row in flight beside a position")
     begin_s = float(time_s[rows[0]])
-    history = recording.history({*FIRMWARE_NAMES, *UNSUPPORTED})
+    history = recording.history({*DEFAULTS, *UNSUPPORTED})
     changes_s = [change_s for change_s in history.times_s if change_s > begin_s]
     rows = rows[time_s[rows] < min(changes_s, default=np.inf)]
     values = history.at(begin_s)
-    for gain in GAINS:
+    for gain in Parameters().gains:
         if gain not in values:
             raise refused(gain, "is missing")
     parameters = parameters_from(values)

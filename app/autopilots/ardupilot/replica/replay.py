@@ -60,7 +60,7 @@ class LoopTrace:
 
 def replayed(trace: LoopTrace) -> Samples:
     """The replica's own outputs, shape (n, 8): free running, except after the rows in `followed`."""
-    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), trace.parameters.packed(trace.dt_s)
+    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), loop.packed(trace.parameters, trace.dt_s)
     if trace.hover is None:
         loop.start_takeoff(state, packed, 0.0)
     else:
@@ -134,6 +134,6 @@ def _advance(
     """Take the loop's steps between two rows; a target counts from the step after its receipt."""
     steps = max(1, round((end_s - begin_s) * log.rate_hz))
     dt_s = (end_s - begin_s) / steps
-    packed = log.parameters.packed(dt_s)
+    packed = loop.packed(log.parameters, dt_s)
     for step in range(1, steps + 1):
         loop.shape(state, packed, [z for time_s, z in targets if time_s < begin_s + step * dt_s][-1])
