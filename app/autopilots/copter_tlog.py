@@ -16,7 +16,7 @@ from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
 from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
 from app.autopilots.px4.recorded_flight import px4_loop, read_px4
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, require_gains
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
@@ -68,9 +68,10 @@ class _Reader:
             rows.target_rate_m_s,
             self._refused_for,
             ("LOCAL_POSITION_NED", none_found),
+            self.autopilot.bounds,
+            lambda _: _READ_LATE,
         )
         part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
-        require_gains(given, self.autopilot.bounds, self._refused_for, lambda _: _READ_LATE)
         learned = self._learned(float(rows.time_s[part[0]]))
         flight = self._flight(rows.trajectory(part), {**given, **learned})
         return replace(flight, assumed=() if self.recording.has_all_parameters else self._assumed(given))

@@ -48,6 +48,11 @@ SOURCES: Final[Mapping[str, Source]] = {
 }
 """`lean` is the cosine of the demanded lean, `reference_error_m` how far the vehicle's own reference is above it; the
 target is NaN where the vehicle flies to none, or was given a speed or an acceleration beside it."""
+_FIELDS: Final = {
+    each.message: [source.field for source in SOURCES.values() if source.message == each.message]
+    for each in SOURCES.values()
+}
+"""Of each message that is reported."""
 _TIME: Final = "time_s"
 _FROM_ANY: Final = frozenset({"PARAM_SET", "SET_POSITION_TARGET_LOCAL_NED"})
 """Requests that count whoever sends them; others only from another system."""
@@ -131,10 +136,10 @@ class _Decoder:
         self._gains = {gain.parameter: gain for gains in self.vehicle.autopilot.gain_sets for gain in gains}
         self.reports = {
             "HEARTBEAT": self._heartbeat,
-            "LOCAL_POSITION_NED": self._position,
+            "LOCAL_POSITION_NED": self._as_it_is,
             "ATTITUDE_TARGET": self._attitude_target,
             "POSITION_TARGET_LOCAL_NED": self._position_target,
-            "NAV_CONTROLLER_OUTPUT": self._reference_error,
+            "NAV_CONTROLLER_OUTPUT": self._as_it_is,
             "SYS_STATUS": self._battery,
             "VFR_HUD": self._throttle,
             "PARAM_VALUE": self._parameter,
@@ -213,8 +218,8 @@ class _Decoder:
         elif sub == _PX4_TAKEOFF_MODE:
             self._events.append(Event(EventKind.TAKEOFF, self._clock.now_s, "takeoff mode"))
 
-    def _position(self, message: Message) -> None:
-        self._report(message, message["z"], message["vz"])
+    def _as_it_is(self, message: Message) -> None:
+        self._report(message, *(message[field] for field in _FIELDS[message.name]))
 
     def _attitude_target(self, message: Message) -> None:
         x, y, thrust = message["q[1]"], message["q[2]"], message["thrust"]
@@ -224,9 +229,6 @@ class _Decoder:
     def _position_target(self, message: Message) -> None:
         is_unknown = self._is_fed or int(message["type_mask"]) & _IGNORES_Z
         self._report(message, np.nan if is_unknown else message["z"])
-
-    def _reference_error(self, message: Message) -> None:
-        self._report(message, message["alt_error"])
 
     def _battery(self, message: Message) -> None:
         if 0 < message["voltage_battery"] < 0xFFFF and np.isfinite(self._clock.now_s):
@@ -305,6 +307,5 @@ class _Decoder:
 
 
 def _table(message: str, reports: "array[float]") -> Table:
-    fields = [source.field for source in SOURCES.values() if source.message == message]
-    rows = np.array(reports).reshape(-1, 1 + len(fields))
-    return dict(zip((_TIME, *fields), rows.T, strict=True))
+    names = (_TIME, *_FIELDS[message])
+    return dict(zip(names, np.array(reports).reshape(-1, len(names)).T, strict=True))

@@ -21,7 +21,6 @@ from app.autopilots.segments import (
     SHORTEST_PART_S,
     choose_parts,
     jumps,
-    require_gains,
     thinned,
 )
 from app.core.analysis.flight import LoggedFlight
@@ -97,8 +96,9 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
         _manoeuvres(rows),
         refused,
         (TARGET, none_found),
+        SPACE.bounds,
+        lambda _: "is missing",
     )
-    require_gains(given, SPACE.bounds, refused, lambda _: "is missing")
     parameters = parameters_from(given)
     limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
     hover = _hover(rows, acceleration_target, is_sound & (thrust > limits[0]) & (thrust < limits[1]))

@@ -96,6 +96,11 @@ NEWER_NAMES: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
 acceleration in m/s² instead of cm/s², throttle as a share instead of per mille, m instead of cm
 (<https://ardupilot.org/copter/docs/common-param-name-changes.html>)."""
 
+SINCE_4_7: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
+    {older: (newer, 1.0 / factor) for newer, (older, factor) in NEWER_NAMES.items()}
+)
+"""Names until release 4.6, each with the later name and the factor from the old value to the new."""
+
 LOOP_RATE: Final = "SCHED_LOOP_RATE"
 ACCELEROMETER_FILTER: Final = "INS_ACCEL_FILTER"
 LOOP_RATE_HZ: Final = 400.0
@@ -118,9 +123,8 @@ def in_older_names(name: str, value: float) -> tuple[str, float]:
 
 def in_newer_names(values: Mapping[str, float]) -> dict[str, float]:
     """Parameters by the names and in the units that they have since release 4.7; unchanged if they were not renamed."""
-    newer = {older: (name, 1.0 / factor) for name, (older, factor) in NEWER_NAMES.items()}
-    renamed = {name: newer.get(name, (name, 1.0)) for name in values}
-    return {renamed[name][0]: _scaled(value, renamed[name][1]) for name, value in values.items()}
+    renamed = ((*SINCE_4_7.get(name, (name, 1.0)), value) for name, value in values.items())
+    return {name: _scaled(value, factor) for name, factor, value in renamed}
 
 
 def _scaled(value: float, factor: float) -> float:
