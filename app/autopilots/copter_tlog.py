@@ -10,11 +10,11 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot
+from app.autopilots.ardupilot.experiments import ardupilot_loop, read_ardupilot
 from app.autopilots.ardupilot.replica.parameters import NEWER_NAMES, in_newer_names, in_older_names
-from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
+from app.autopilots.copter_autopilots import AUTOPILOTS, IN_TAKEOFFS, CopterAutopilot
 from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
-from app.autopilots.px4.recorded_flight import px4_loop, read_px4
+from app.autopilots.px4.experiments import px4_loop, read_px4
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
 from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts
 from app.autopilots.tlog import SOURCES
@@ -149,8 +149,8 @@ class _Reader:
 
     def _missing_parameters(self) -> Iterator[Problem]:
         known = {name for _, name, _ in self._settings()}
-        for each in self.autopilot.required:
-            if each not in known:
+        for each in (*self.autopilot.bounds, self.autopilot.learned):
+            if each and each not in known:
                 newer = next(iter(in_newer_names({each: 0.0})))
                 renamed = f", nor {newer} of release 4.7" if newer != each else ""
                 yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
@@ -171,7 +171,8 @@ class _Reader:
 
     def _assumed(self, given: Parameters) -> tuple[str, ...]:
         """By the names of the vehicle's release."""
-        absent = [each for each in self.autopilot.usual if each not in {*given, self.autopilot.learned}]
+        known = {*given, self.autopilot.learned, *IN_TAKEOFFS}
+        absent = [each for each in self.autopilot.usual if each not in known]
         return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
 
     @property

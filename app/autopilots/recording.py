@@ -44,6 +44,13 @@ class EventKind(StrEnum):
     END = "end"
 
 
+COMMANDS: Final[Mapping[float, tuple[EventKind, str]]] = {
+    22: (EventKind.TAKEOFF, "the command NAV_TAKEOFF"),
+    21: (EventKind.COMMAND, "the command NAV_LAND"),
+}
+"""Commands of MAVLink that begin and end a flight."""
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """An event in seconds of the recording, and its description: "the block Takeoff"."""

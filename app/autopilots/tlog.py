@@ -102,10 +102,6 @@ class _Clock:
         return time_s
 
 
-def _numbers() -> "array[float]":
-    return array("d")
-
-
 @dataclass(slots=True)
 class _Decoder:
     """Messages of ground stations and the vehicle, in order of receipt."""
@@ -115,7 +111,7 @@ class _Decoder:
     requests: Mapping[str, Callable[[Message], None]] = field(init=False)
     _gains: Mapping[str, GainParameter] = field(init=False)
     _clock: _Clock = field(default_factory=_Clock)
-    _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(_numbers))
+    _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(lambda: array("d")))
     _blocks: dict[int, str] = field(default_factory=dict)
     _activated: list[tuple[float, int]] = field(default_factory=list)
     _entered: list[tuple[float, int]] = field(default_factory=list)
@@ -187,12 +183,14 @@ class _Decoder:
             events=[*self._events, *self._clock.restarts],
             armed=spans_of(self._arming) or None,
             blocks=list(self._commanded_blocks()),
-            notes=[*restarts(len(self._clock.restarts)), *self._unconfirmed()],
+            notes=[
+                *restarts(len(self._clock.restarts)),
+                *(
+                    f"{name} was set to {value:g}, but the vehicle never confirmed it"
+                    for name, value in self._asked.items()
+                ),
+            ],
         )
-
-    def _unconfirmed(self) -> Iterator[str]:
-        for name, value in self._asked.items():
-            yield f"{name} was set to {value:g}, but the vehicle never confirmed it"
 
     def _report(self, message: Message, *values: float) -> None:
         """Take a report, dated by its own time, or else by the last one."""
