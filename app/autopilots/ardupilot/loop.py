@@ -44,7 +44,7 @@ _TEXTS: Final = LoopTexts(
     autopilot="ArduCopter",
     prefix="PSC_",
     hover_parameter="MOT_THST_HOVER",
-    hover_range=(0.125, 0.6875),
+    hover_range=(loop.HOVER_MIN, loop.HOVER_MAX),
     hover_use=(
         "the integral has to make up for the difference after every takeoff, and with MOT_HOVER_LEARN at 0, as in a "
         "campaign, the parameter stays as it is"

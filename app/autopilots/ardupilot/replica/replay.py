@@ -8,7 +8,7 @@ the next.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ SHAPED: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
 _LONGEST_INTERVAL_S: Final = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class Hover:
+class Hover(NamedTuple):
     """A start in flight: throttle demanded and filtered, altitude in m, climb rate in m/s and acceleration in m/s²."""
 
     throttle: float
@@ -64,8 +63,7 @@ def replayed(trace: LoopTrace) -> Samples:
     if trace.hover is None:
         loop.start_takeoff(state, packed, 0.0)
     else:
-        hover = trace.hover
-        loop.start_hover(state, packed, hover.throttle, hover.z_m, hover.v_m_s, hover.a_m_s2)
+        loop.start_hover(state, packed, *trace.hover)
     computed = np.empty_like(trace.outputs)
     loop.rollout(state, packed, trace.inputs, trace.outputs, trace.followed, computed)
     return computed
