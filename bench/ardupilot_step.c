@@ -5,11 +5,12 @@
 #include <stdint.h>
 
 typedef struct {
-    double dt, climb, descent, acceleration, jerk, hover, position_p;
+    double position_p;
     double velocity_p, velocity_i, velocity_d, velocity_ff, velocity_imax, velocity_error_gain, velocity_derivative_gain;
     double acceleration_p, acceleration_i, acceleration_d, acceleration_ff, acceleration_d_ff, acceleration_imax;
-    double target_gain, acceleration_error_gain, acceleration_derivative_gain, throttle_gain;
-    double relaxation_gain, ramp_step, ramp_end;
+    double target_gain, acceleration_error_gain, acceleration_derivative_gain;
+    double jerk, climb, descent, acceleration, hover, ramp_step, ramp_end;
+    double dt, throttle_gain, relaxation_gain;
 } Parameters;
 
 typedef struct {

@@ -59,7 +59,7 @@ def flown() -> Array:
 def in_c(library: ctypes.CDLL, inputs: Array) -> Run:
     function = library.rollout
     function.restype = None
-    packed, outputs, state = PARAMETERS.packed(), np.empty((STEPS, len(loop.OUTPUTS))), np.empty(loop.STATE_SIZE)
+    packed, outputs, state = loop.packed(PARAMETERS), np.empty((STEPS, len(loop.OUTPUTS))), np.empty(loop.STATE_SIZE)
     arrays = [ctypes.c_void_p(array.ctypes.data) for array in (state, packed, inputs, outputs)]
 
     def run() -> Array:
@@ -71,7 +71,7 @@ def in_c(library: ctypes.CDLL, inputs: Array) -> Run:
 
 
 def in_python(inputs: Array) -> Run:
-    packed, outputs, state = PARAMETERS.packed(), np.empty((STEPS, len(loop.OUTPUTS))), np.empty(loop.STATE_SIZE)
+    packed, outputs, state = loop.packed(PARAMETERS), np.empty((STEPS, len(loop.OUTPUTS))), np.empty(loop.STATE_SIZE)
     followed = np.zeros(STEPS, dtype=np.bool_)
 
     def run() -> Array:

@@ -80,7 +80,7 @@ def in_python(inputs: Array) -> Run:
 
 def _arrays() -> tuple[Array, Array, Array]:
     outputs = np.empty((STEPS, len(loop.OUTPUTS)), dtype=np.float32)
-    return PARAMETERS.packed(), outputs, np.empty(loop.STATE_SIZE, dtype=np.float32)
+    return loop.packed(PARAMETERS), outputs, np.empty(loop.STATE_SIZE, dtype=np.float32)
 
 
 def main() -> int:

@@ -17,10 +17,9 @@ class CopterAutopilot:
     """What differs between the two.
 
     `number_of_mode` is of the custom mode in a heartbeat; `mode` is the one whose set points the vehicle reports.
-    `messages` are needed. Of the parameters, `required` are needed, with the gains among them in `bounds`; `kept` are
-    all on which the loop depends, `usual` those that every release has and that act in flight. `learned` one that the
-    vehicle changes by itself. `shapes_reference` if the reference is not the set point itself. `hint` says what to
-    record.
+    `messages` are needed. Of the parameters, the gains in `bounds` are needed, and `learned` if there is one, which the
+    vehicle changes by itself; `kept` are all on which the loop depends, `usual` those that every release has.
+    `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
     """
 
     number_of_mode: Callable[[int], int]
@@ -28,7 +27,6 @@ class CopterAutopilot:
     modes: Mapping[float, str]
     messages: Sequence[str]
     bounds: Mapping[str, tuple[float, float]]
-    required: Sequence[str]
     kept: Sequence[str]
     usual: Sequence[str]
     learned: str
@@ -40,20 +38,16 @@ class CopterAutopilot:
         return self.modes.get(mode, f"mode {mode}")
 
 
-_LEARNED: Final = "MOT_THST_HOVER"
 _ASK: Final = (
     "Use a telemetry log of altitude steps in {mode}: hover for 5 s, climb 2 m, hover for 5 s, descend 2 m, hover for "
     "5 s. Before it read all parameters, and ask the vehicle for 50 of each of these messages a second: "
     "MAV_CMD_SET_MESSAGE_INTERVAL with 20000 µs for {messages}{or_else}. The vehicle's own log ({own}) needs none of "
     "this."
 )
-_IN_TAKEOFFS: Final = frozenset(
+IN_TAKEOFFS: Final = frozenset(
     {"TKOFF_SLEW_TIME", "TKOFF_THR_MAX", "MPC_TKO_RAMP_T", "COM_SPOOLUP_TIME", "MPC_LAND_SPEED"}
 )
-
-
-def _in_flight(*names: str) -> Sequence[str]:
-    return tuple(name for name in names if name not in _IN_TAKEOFFS)
+"""Parameters that act in takeoffs and landings alone."""
 
 
 AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
@@ -64,11 +58,10 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
             modes=MODES,
             messages=("LOCAL_POSITION_NED", "NAV_CONTROLLER_OUTPUT", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
             bounds=ardupilot_loop.SPACE.bounds,
-            required=(*ardupilot_loop.SPACE.bounds, _LEARNED),
-            learned=_LEARNED,
+            learned="MOT_THST_HOVER",
             kept=ardupilot_parameters.LOOP_NAMES,
-            usual=_in_flight(
-                *ardupilot_parameters.FIRMWARE_NAMES,
+            usual=(
+                *ardupilot_parameters.DEFAULTS,
                 ardupilot_parameters.ACCELEROMETER_FILTER,
                 ardupilot_parameters.LOOP_RATE,
             ),
@@ -86,10 +79,9 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
             modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
             messages=("LOCAL_POSITION_NED", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
             bounds=px4_loop.SPACE.bounds,
-            required=tuple(px4_loop.SPACE.bounds),
             learned="",
             kept=px4_parameters.LOOP_NAMES,
-            usual=_in_flight(*px4_parameters.FIRMWARE_NAMES, *px4_parameters.ESTIMATOR_NAMES),
+            usual=(*px4_parameters.DEFAULTS, *px4_parameters.ESTIMATOR_NAMES),
             shapes_reference=False,
             hint=_ASK.format(
                 mode="Offboard",

@@ -10,13 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot
+from app.autopilots.ardupilot.experiments import ardupilot_loop, read_ardupilot
 from app.autopilots.ardupilot.replica.parameters import NEWER_NAMES, in_newer_names, in_older_names
-from app.autopilots.copter_autopilots import AUTOPILOTS, CopterAutopilot
+from app.autopilots.copter_autopilots import AUTOPILOTS, IN_TAKEOFFS, CopterAutopilot
 from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
-from app.autopilots.px4.recorded_flight import px4_loop, read_px4
+from app.autopilots.px4.experiments import px4_loop, read_px4
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, require_gains
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
@@ -68,9 +68,10 @@ class _Reader:
             rows.target_rate_m_s,
             self._refused_for,
             ("LOCAL_POSITION_NED", none_found),
+            self.autopilot.bounds,
+            lambda _: _READ_LATE,
         )
         part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
-        require_gains(given, self.autopilot.bounds, self._refused_for, lambda _: _READ_LATE)
         learned = self._learned(float(rows.time_s[part[0]]))
         flight = self._flight(rows.trajectory(part), {**given, **learned})
         return replace(flight, assumed=() if self.recording.has_all_parameters else self._assumed(given))
@@ -148,8 +149,8 @@ class _Reader:
 
     def _missing_parameters(self) -> Iterator[Problem]:
         known = {name for _, name, _ in self._settings()}
-        for each in self.autopilot.required:
-            if each not in known:
+        for each in (*self.autopilot.bounds, self.autopilot.learned):
+            if each and each not in known:
                 newer = next(iter(in_newer_names({each: 0.0})))
                 renamed = f", nor {newer} of release 4.7" if newer != each else ""
                 yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
@@ -170,7 +171,8 @@ class _Reader:
 
     def _assumed(self, given: Parameters) -> tuple[str, ...]:
         """By the names of the vehicle's release."""
-        absent = [each for each in self.autopilot.usual if each not in {*given, self.autopilot.learned}]
+        known = {*given, self.autopilot.learned, *IN_TAKEOFFS}
+        absent = [each for each in self.autopilot.usual if each not in known]
         return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
 
     @property

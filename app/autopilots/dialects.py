@@ -30,8 +30,7 @@ class Message(Protocol):
     """One MAVLink message of the library. Its fields are attributes; `number` and `text` read them with a type."""
 
     def get_type(self) -> str: ...
-    def get_msgId(self) -> int: ...  # noqa: N802  the library's name
-    def get_srcSystem(self) -> int: ...  # noqa: N802
+    def get_srcSystem(self) -> int: ...  # noqa: N802  the library's name
     def get_srcComponent(self) -> int: ...  # noqa: N802
     def get_msgbuf(self) -> bytearray: ...
     def get_fieldnames(self) -> list[str]: ...

@@ -19,7 +19,7 @@ from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.autopilots.px4 import loop_check as px4
 from app.autopilots.px4.profile import PX4
 from app.core.errors import InputError, Problem
-from app.logs.formats import HEAD_BYTES, recognise
+from app.logs.formats import head_of, recognise
 
 CHECKS: Final[Mapping[Autopilot, LoopCheck]] = MappingProxyType(
     {ARDUPILOT: ardupilot.CHECK, PX4: px4.CHECK, PAPARAZZI: paparazzi.CHECK}
@@ -32,7 +32,7 @@ def examine(
     stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
 ) -> Result:
     """Check a log or a trace, whichever the content is. Raises InputError that names what cannot be read."""
-    head = _head_of(stream)
+    head = head_of(stream)
     upload = Upload(stream=stream, name=name, companion=companion, given=given)
     if (autopilot := _recognised(head)) is not None:
         check = CHECKS[autopilot]
@@ -48,7 +48,7 @@ def examine(
 
 def autopilot_of(stream: BinaryIO) -> Autopilot | None:
     """The autopilot whose recording this is; None if it is of none."""
-    return _recognised(_head_of(stream))
+    return _recognised(head_of(stream))
 
 
 def examine_content(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
@@ -68,13 +68,6 @@ def examine_file(path: Path) -> Result:
         raise InputError(
             f"{path} could not be read: {error.strerror or error}.", hint="Give a readable recording of the loop."
         ) from error
-
-
-def _head_of(stream: BinaryIO) -> bytes:
-    stream.seek(0)
-    head = stream.read(HEAD_BYTES)
-    stream.seek(0)
-    return head
 
 
 def _recognised(head: bytes) -> Autopilot | None:

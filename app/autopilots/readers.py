@@ -20,7 +20,7 @@ from app.autopilots.tlog_vehicle import HINT as TLOG_HINT
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.logs.base import refused
-from app.logs.formats import HEAD_BYTES, Format, recognise
+from app.logs.formats import Format, head_of, recognise
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.logs.ulog import HINT as ULOG_HINT
 
@@ -97,9 +97,7 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     The kind of log is determined from the content; the file `name` is used only in error messages. `companion` is the
     .log file of a .data file. Raises TrajectoryError for anything that cannot be read.
     """
-    stream.seek(0)
-    head = stream.read(HEAD_BYTES)
-    stream.seek(0)
+    head = head_of(stream)
     if (reader := reader_of(head)) is not None:
         return reader.takeoffs(reader.read(stream, companion))
     suffix = PurePath(name).suffix.lower()

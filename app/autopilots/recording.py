@@ -44,6 +44,13 @@ class EventKind(StrEnum):
     END = "end"
 
 
+COMMANDS: Final[Mapping[float, tuple[EventKind, str]]] = {
+    22: (EventKind.TAKEOFF, "the command NAV_TAKEOFF"),
+    21: (EventKind.COMMAND, "the command NAV_LAND"),
+}
+"""Commands of MAVLink that begin and end a flight."""
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """An event in seconds of the recording, and its description: "the block Takeoff"."""
@@ -112,7 +119,13 @@ class Column:
 
     def beside(self, time_s: Samples) -> Samples:
         """The quantity between two reports that are near to each other, shape (m,); NaN elsewhere."""
-        return beside(self.time_s, self.values, time_s)
+        at_s = self.time_s
+        if len(at_s) < 2:
+            return np.full(len(time_s), np.nan)
+        after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
+        found = np.interp(time_s, at_s, self.values, left=np.nan, right=np.nan)
+        found[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
+        return found
 
 
 def columns_of(
@@ -238,17 +251,6 @@ def _latest(at_s: Samples) -> NDArray[np.int64]:
     """The last row, shape (k,), of each time that is later than all before it."""
     kept = np.flatnonzero(at_s >= np.fmax.accumulate(at_s))
     return np.append(kept[:-1][at_s[kept[1:]] > at_s[kept[:-1]]], kept[-1:])
-
-
-def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:
-    """Values known at `at_s`, shape (k,) each, which increases, at other times, shape (n,), linear between its rows;
-    NaN outside them, and between two that are too far apart."""
-    if len(at_s) < 2:
-        return np.full(len(time_s), np.nan)
-    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
-    found = np.interp(time_s, at_s, values, left=np.nan, right=np.nan)
-    found[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
-    return found
 
 
 def held(at_s: Samples, values: Samples, time_s: Samples, *, longest_s: float = np.inf) -> Samples:

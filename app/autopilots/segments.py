@@ -24,18 +24,6 @@ Condition = tuple[Rows, str, str]
 """Rows that can be used, shape (n,), and the field and the reason of a refusal if there are none."""
 
 
-def require_gains(
-    given: Parameters, bounds: Mapping[str, tuple[float, float]], refused: Refused, absent: Callable[[str], str]
-) -> None:
-    """Require that the loop had all gains of the search, positive where the search has no zero. Raises what `refused`
-    makes of the gain and the reason; `absent` gives that of one that is missing."""
-    for each, (least, _) in bounds.items():
-        if each not in given:
-            raise refused(each, absent(each))
-        if given[each] < 0.0 or (least and not given[each]):
-            raise refused(each, f"must be positive, got {given[each]:g}")
-
-
 def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> Rows:
     """Rows, shape (n,), whose value differs by more than `largest` from what its rate made of the one before."""
     followed = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time_s)
@@ -102,11 +90,14 @@ def choose_parts(
     acceleration_m_s2: Samples,
     refused: Refused,
     none_found: tuple[str, str],
+    bounds: Mapping[str, tuple[float, float]],
+    absent: Callable[[str], str],
 ) -> tuple[Parameters, list[Part]]:
     """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters.
 
     Signals have shape (n,), `acceleration_m_s2` is that of the reference. Raises what `refused` makes of the field and
-    the reason of the first condition that leaves no row, or of `none_found` if no part is long enough.
+    the reason of the first condition that leaves no row, or of `none_found` if no part is long enough; and of a gain in
+    `bounds` that is missing, for the reason that `absent` gives, or not positive where the search has no zero.
     """
     usable = np.ones(len(time_s), dtype=np.bool_)
     for condition, field, reason in conditions:
@@ -118,6 +109,11 @@ def choose_parts(
         raise refused(*none_found)
     manoeuvres = Manoeuvres(time_s, acceleration_m_s2)
     given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
+    for each, (least, _) in bounds.items():
+        if each not in given:
+            raise refused(each, absent(each))
+        if given[each] < 0.0 or (least and not given[each]):
+            raise refused(each, f"must be positive, got {given[each]:g}")
     return given, manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])
 
 

@@ -48,6 +48,11 @@ SOURCES: Final[Mapping[str, Source]] = {
 }
 """`lean` is the cosine of the demanded lean, `reference_error_m` how far the vehicle's own reference is above it; the
 target is NaN where the vehicle flies to none, or was given a speed or an acceleration beside it."""
+_FIELDS: Final = {
+    each.message: [source.field for source in SOURCES.values() if source.message == each.message]
+    for each in SOURCES.values()
+}
+"""Of each message that is reported."""
 _TIME: Final = "time_s"
 _FROM_ANY: Final = frozenset({"PARAM_SET", "SET_POSITION_TARGET_LOCAL_NED"})
 """Requests that count whoever sends them; others only from another system."""
@@ -97,10 +102,6 @@ class _Clock:
         return time_s
 
 
-def _numbers() -> "array[float]":
-    return array("d")
-
-
 @dataclass(slots=True)
 class _Decoder:
     """Messages of ground stations and the vehicle, in order of receipt."""
@@ -110,7 +111,7 @@ class _Decoder:
     requests: Mapping[str, Callable[[Message], None]] = field(init=False)
     _gains: Mapping[str, GainParameter] = field(init=False)
     _clock: _Clock = field(default_factory=_Clock)
-    _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(_numbers))
+    _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(lambda: array("d")))
     _blocks: dict[int, str] = field(default_factory=dict)
     _activated: list[tuple[float, int]] = field(default_factory=list)
     _entered: list[tuple[float, int]] = field(default_factory=list)
@@ -131,10 +132,10 @@ class _Decoder:
         self._gains = {gain.parameter: gain for gains in self.vehicle.autopilot.gain_sets for gain in gains}
         self.reports = {
             "HEARTBEAT": self._heartbeat,
-            "LOCAL_POSITION_NED": self._position,
+            "LOCAL_POSITION_NED": self._as_it_is,
             "ATTITUDE_TARGET": self._attitude_target,
             "POSITION_TARGET_LOCAL_NED": self._position_target,
-            "NAV_CONTROLLER_OUTPUT": self._reference_error,
+            "NAV_CONTROLLER_OUTPUT": self._as_it_is,
             "SYS_STATUS": self._battery,
             "VFR_HUD": self._throttle,
             "PARAM_VALUE": self._parameter,
@@ -182,12 +183,14 @@ class _Decoder:
             events=[*self._events, *self._clock.restarts],
             armed=spans_of(self._arming) or None,
             blocks=list(self._commanded_blocks()),
-            notes=[*restarts(len(self._clock.restarts)), *self._unconfirmed()],
+            notes=[
+                *restarts(len(self._clock.restarts)),
+                *(
+                    f"{name} was set to {value:g}, but the vehicle never confirmed it"
+                    for name, value in self._asked.items()
+                ),
+            ],
         )
-
-    def _unconfirmed(self) -> Iterator[str]:
-        for name, value in self._asked.items():
-            yield f"{name} was set to {value:g}, but the vehicle never confirmed it"
 
     def _report(self, message: Message, *values: float) -> None:
         """Take a report, dated by its own time, or else by the last one."""
@@ -213,8 +216,8 @@ class _Decoder:
         elif sub == _PX4_TAKEOFF_MODE:
             self._events.append(Event(EventKind.TAKEOFF, self._clock.now_s, "takeoff mode"))
 
-    def _position(self, message: Message) -> None:
-        self._report(message, message["z"], message["vz"])
+    def _as_it_is(self, message: Message) -> None:
+        self._report(message, *(message[field] for field in _FIELDS[message.name]))
 
     def _attitude_target(self, message: Message) -> None:
         x, y, thrust = message["q[1]"], message["q[2]"], message["thrust"]
@@ -224,9 +227,6 @@ class _Decoder:
     def _position_target(self, message: Message) -> None:
         is_unknown = self._is_fed or int(message["type_mask"]) & _IGNORES_Z
         self._report(message, np.nan if is_unknown else message["z"])
-
-    def _reference_error(self, message: Message) -> None:
-        self._report(message, message["alt_error"])
 
     def _battery(self, message: Message) -> None:
         if 0 < message["voltage_battery"] < 0xFFFF and np.isfinite(self._clock.now_s):
@@ -305,6 +305,5 @@ class _Decoder:
 
 
 def _table(message: str, reports: "array[float]") -> Table:
-    fields = [source.field for source in SOURCES.values() if source.message == message]
-    rows = np.array(reports).reshape(-1, 1 + len(fields))
-    return dict(zip((_TIME, *fields), rows.T, strict=True))
+    names = (_TIME, *_FIELDS[message])
+    return dict(zip(names, np.array(reports).reshape(-1, len(names)).T, strict=True))

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Final
+from typing import BinaryIO, Final
 
 from app.logs.dataflash import is_dataflash
 from app.logs.tlog import is_tlog
@@ -23,6 +23,14 @@ class Format(StrEnum):
     GZIP = ".gz"
     ZIP = ".zip"
     DATAFLASH_TEXT = ".log"
+
+
+def head_of(stream: BinaryIO) -> bytes:
+    """The first bytes of a file, which is at its beginning afterwards."""
+    stream.seek(0)
+    head = stream.read(HEAD_BYTES)
+    stream.seek(0)
+    return head
 
 
 def is_ground_log(head: bytes) -> bool:

@@ -83,6 +83,10 @@ class TraceChecks:
             raise self.malformed(f"line 1, {key}", "must be a JSON object")
         return found
 
+    def numbers_in(self, described: Mapping[str, object], key: str) -> dict[str, float]:
+        given = self.object_in(described, key)
+        return {each: self.number_in(given, each) for each in given}
+
     def number_in(self, described: Mapping[str, object], key: str) -> float:
         found = described.get(key)
         if isinstance(found, bool) or not isinstance(found, int | float) or not np.isfinite(found):

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.replica.parameters import FIRMWARE_NAMES, STEP_S, parameters_from
+from app.autopilots.ardupilot.replica.parameters import DEFAULTS, STEP_S, parameters_from
 from app.autopilots.experiments import get_experiment
 from app.autopilots.px4.replica import parameters as px4_parameters
 from app.core.experiments.copter_steps import CopterSteps
@@ -79,15 +79,11 @@ def _record(experiment: CopterSteps, time_s: Samples, channels: Mapping[str, Sam
 
 
 def _ardupilot_parameters(copter: SimulatedCopter) -> Mapping[str, float]:
-    defaults = parameters_from({})
-    values = {name: getattr(defaults, field) / factor for name, (field, factor) in FIRMWARE_NAMES.items()}
-    return {**values, "MOT_THST_HOVER": copter.assumed_hover_throttle, "INS_ACCEL_FILTER": simulation.FILTER_HZ}
+    return {**DEFAULTS, "MOT_THST_HOVER": copter.assumed_hover_throttle, "INS_ACCEL_FILTER": simulation.FILTER_HZ}
 
 
 def _px4_parameters(copter: SimulatedCopter) -> Mapping[str, float]:
-    defaults = px4_parameters.parameters_from({})
-    values = {name: getattr(defaults, field) for name, field in px4_parameters.FIRMWARE_NAMES.items()}
-    return {**values, "MPC_THR_HOVER": copter.assumed_hover_throttle, "IMU_INTEG_RATE": 250.0}
+    return {**px4_parameters.DEFAULTS, "MPC_THR_HOVER": copter.assumed_hover_throttle, "IMU_INTEG_RATE": 250.0}
 
 
 RIGS: Final[Mapping[str, CampaignRig]] = {

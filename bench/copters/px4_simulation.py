@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from app.autopilots.px4.loop import SLOW_HZ, Px4Loop
 from app.autopilots.px4.replica import vertical as loop
-from app.autopilots.px4.replica.parameters import STEP_S, Packed, Parameters, low_pass_gain
+from app.autopilots.px4.replica.parameters import STEP_S, Parameters, low_pass_gain
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.kernels import kernel
@@ -98,7 +98,7 @@ def _flown(
     copter: SimulatedCopter, parameters: Parameters, estimate: float, weather: Samples, reference: Samples
 ) -> Samples:
     """Altitude, climb rate, climb rate target and thrust at each step, shape (n, 4)."""
-    p, flown = parameters.packed(), np.empty((len(reference), 4))
+    p, flown = loop.packed(parameters), np.empty((len(reference), 4))
     state = np.empty(loop.STATE_SIZE, dtype=np.float32)
     loop.start_hover(state, p, estimate, copter.hover_throttle, 0.0)
     inputs, outputs = np.zeros((1, len(loop.INPUTS)), np.float32), np.empty((1, len(loop.OUTPUTS)), np.float32)
@@ -142,7 +142,7 @@ def _smooth(since_s: Samples, change_m: float) -> Samples:
 @kernel
 def _fly(
     state: loop.State,
-    p: Packed,
+    p: loop.Packed,
     copter: Samples,
     weather: Samples,
     reference: Samples,

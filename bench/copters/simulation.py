@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.autopilots.ardupilot.replica import vertical as loop
-from app.autopilots.ardupilot.replica.parameters import DT, STEP_S, THROTTLE_GAIN, Packed, Parameters
+from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.kernels import kernel
@@ -133,7 +133,7 @@ def fly_targets(copter: SimulatedCopter, parameters: Parameters, targets: Sample
     """Fly along these targets, shape (n,), from hover at the first of them: shape (n, 9), with the columns altitude,
     climb rate and acceleration as measured, the same as desired, the climb rate target, and the throttle as demanded
     and as filtered."""
-    p = parameters.packed()
+    p = loop.packed(parameters)
     state, flown = np.empty(loop.STATE_SIZE), np.empty((len(targets), 9))
     loop.start_hover(state, p, copter.hover_throttle, float(targets[0]), 0.0, 0.0)
     numerator, denominator = accelerometer_filter(FILTER_HZ, STEP_S)
@@ -212,7 +212,7 @@ def move(moving: Samples, copter: Samples, command: float, time_s: float, gust: 
 @kernel
 def _fly(
     state: loop.State,
-    p: Packed,
+    p: loop.Packed,
     copter: Samples,
     weather: Samples,
     targets: Samples,
@@ -225,7 +225,7 @@ def _fly(
     b, a_filter = accelerometer[:3], accelerometer[3:]
     for row in range(len(targets)):
         filtered = state[loop.THROTTLE_FILTERED]
-        filtered += p[THROTTLE_GAIN] * (state[loop.THROTTLE] - filtered)
+        filtered += p[loop.THROTTLE_GAIN] * (state[loop.THROTTLE] - filtered)
         measured_z, measured_v = moving[1] + weather[row, 3], moving[2] + weather[row, 2]
         measured_a = sensed + weather[row, 1]
         loop.shape(state, p, targets[row])
@@ -236,7 +236,7 @@ def _fly(
         flown[row, 7], flown[row, 8] = state[loop.THROTTLE], state[loop.THROTTLE_FILTERED]
         late = row - int(copter[6])
         command = flown[late, 8] if late >= 0 else hover
-        a = move(moving, copter, command, row * p[DT], weather[row, 0], p[DT])
+        a = move(moving, copter, command, row * p[loop.DT], weather[row, 0], p[loop.DT])
         sensed = b[0] * a + memory_1
         memory_1 = b[1] * a - a_filter[1] * sensed + memory_2
         memory_2 = b[2] * a - a_filter[2] * sensed

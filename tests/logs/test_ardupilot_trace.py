@@ -5,8 +5,9 @@ import pytest
 
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.replay import Hover, LoopTrace
-from app.autopilots.ardupilot.trace import COLUMNS, is_ardupilot_trace, read_ardupilot_trace
+from app.autopilots.ardupilot.trace import COLUMNS, read_ardupilot_trace
 from app.core.errors import InputError
+from app.logs.trace_table import has_columns
 
 HOVER = {"z_m": 6.0, "v_m_s": 0.1, "a_m_s2": -0.2, "throttle": 0.39}
 DESCRIPTION = {
@@ -45,8 +46,8 @@ def test_a_takeoff_has_its_slew_time_and_no_hover() -> None:
 
 
 def test_a_trace_is_recognised_by_its_columns() -> None:
-    assert is_ardupilot_trace(content())
-    assert not is_ardupilot_trace(content().replace(b"a_t_m_s2", b"thrust"))
+    assert has_columns(content(), COLUMNS)
+    assert not has_columns(content().replace(b"a_t_m_s2", b"thrust"), COLUMNS)
 
 
 @pytest.mark.parametrize(

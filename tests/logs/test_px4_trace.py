@@ -7,8 +7,9 @@ import pytest
 from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.replay import LoopTrace
 from app.autopilots.px4.replica.vertical import INPUTS, OUTPUTS
-from app.autopilots.px4.trace import COLUMNS, is_px4_trace, read_px4_trace
+from app.autopilots.px4.trace import COLUMNS, read_px4_trace
 from app.core.errors import InputError
+from app.logs.trace_table import has_columns
 
 DESCRIPTION = {"what": "a hover", "parameters": {"MPC_Z_P": 1.5, "SIH_MASS": 1.0}}
 ROW = {
@@ -88,8 +89,8 @@ def test_of_the_loop_alone_the_recording_tells_when_it_read_what() -> None:
 
 
 def test_a_trace_is_recognised_by_its_columns() -> None:
-    assert is_px4_trace(content())
-    assert not is_px4_trace(content().replace(b"out_thrust", b"thrust"))
+    assert has_columns(content(), COLUMNS)
+    assert not has_columns(content().replace(b"out_thrust", b"thrust"), COLUMNS)
     assert set(ROW) == set(COLUMNS)
 
 

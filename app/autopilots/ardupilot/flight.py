@@ -24,7 +24,6 @@ from app.autopilots.segments import (
     SHORTEST_PART_S,
     choose_parts,
     jumps,
-    require_gains,
     thinned,
 )
 from app.core.analysis.flight import LoggedFlight
@@ -88,9 +87,10 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         rows.a_d_m_s2,
         refused,
         ("PSCD", none_found),
+        SPACE.bounds,
+        _is_missing,
     )
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
-    require_gains(given, SPACE.bounds, refused, _is_missing)
     rate_hz = given.get(LOOP_RATE, LOOP_RATE_HZ)
     if not LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1]:
         raise refused(LOOP_RATE, f"must be {LOOP_RATES_HZ[0]:g} to {LOOP_RATES_HZ[1]:g} Hz, got {rate_hz:g}")

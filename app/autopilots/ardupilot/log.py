@@ -11,6 +11,7 @@ import numpy as np
 from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.recording import (
+    COMMANDS,
     Event,
     EventKind,
     ParameterHistory,
@@ -59,9 +60,6 @@ _WANTED: Final = frozenset(
     {"PARM", "MAVC", "EV", "MSG", "PSCZ", *(each.message for each in (*LOOP.values(), *_BESIDE.values()))}
 )
 
-_COMMANDS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
-    {22: (EventKind.TAKEOFF, "NAV_TAKEOFF"), 21: (EventKind.COMMAND, "NAV_LAND")}
-)
 _ACCEPTED: Final = (0, 5)
 _EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
     {
@@ -105,8 +103,9 @@ def _events(tables: Mapping[str, Table], boots_s: Sequence[float]) -> Iterator[E
     """Takeoff commands, events that end the flight, and landings."""
     yield from (Event(EventKind.BOOT, boot_s, "the vehicle restarting") for boot_s in boots_s)
     for time_s, command, result in rows_of(tables.get("MAVC", {}), "TimeUS", "Cmd", "Res"):
-        if result in _ACCEPTED and command in _COMMANDS:
-            yield Event(_COMMANDS[command][0], time_s, f"the command {_COMMANDS[command][1]}")
+        if result in _ACCEPTED and command in COMMANDS:
+            kind, what = COMMANDS[command]
+            yield Event(kind, time_s, what)
     modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
     for (_, before), (time_s, mode) in pairwise(modes):
         if mode != before:

@@ -1,25 +1,18 @@
 """ArduCopter's altitude loop as an analysis takes it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 
 from app.autopilots.ardupilot.replica import vertical as loop
 from app.autopilots.ardupilot.replica.copter import fly, step
-from app.autopilots.ardupilot.replica.parameters import (
-    ACCELEROMETER_FILTER,
-    FIRMWARE_NAMES,
-    HOVER,
-    LOOP_RATE,
-    Packed,
-    Parameters,
-    in_newer_names,
-)
+from app.autopilots.ardupilot.replica.parameters import ACCELEROMETER_FILTER, LOOP_RATE, Parameters, in_newer_names
 from app.autopilots.ardupilot.replica.shaping import square_root
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
+from app.autopilots.copter_loop import CopterLoop
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps
 from app.core.models.copter import (
     DISTURBANCES,
@@ -51,7 +44,7 @@ _TEXTS: Final = LoopTexts(
     autopilot="ArduCopter",
     prefix="PSC_",
     hover_parameter="MOT_THST_HOVER",
-    hover_range=(0.125, 0.6875),
+    hover_range=(loop.HOVER_MIN, loop.HOVER_MAX),
     hover_use=(
         "the integral has to make up for the difference after every takeoff, and with MOT_HOVER_LEARN at 0, as in a "
         "campaign, the parameter stays as it is"
@@ -84,19 +77,20 @@ _NUDGE: Final = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ArduPilotLoop:
+class ArduPilotLoop(CopterLoop):
     """The loop (`AltitudeLoop`). `filter_hz` is the cut-off of the accelerometer's filter. `has_newer_names` if the
     vehicle's parameters have the names and units of release 4.7. The acceleration in the log is the sensed one, or the
     change of the climb rate over `row_s`, a whole number of steps."""
 
     parameters: Parameters
     filter_hz: float
-    step_s: float
     has_newer_names: bool = False
     row_s: float | None = None
 
     texts = _TEXTS
     space = SPACE
+    fast = ("PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D", "PSC_ACCZ_FF")
+    compared = ((2.0, 7.0, 1.0, 2.0), (3.0, 8.0, 0.5, 3.0))
     throttle_limits = (0.0, 1.0)
     usual_slope = (1.0, 0.25)
     slope_error = 0.0
@@ -104,17 +98,8 @@ class ArduPilotLoop:
     hover_limits = None
 
     @property
-    def gains(self) -> dict[str, float]:
-        return {name: value for name, value in self.parameters.gains.items() if name in SPACE.bounds}
-
-    @property
     def firmware_parameters(self) -> dict[str, float]:
-        values = {name: getattr(self.parameters, field) / factor for name, (field, factor) in FIRMWARE_NAMES.items()}
-        return values | {LOOP_RATE: 1.0 / self.step_s, ACCELEROMETER_FILTER: self.filter_hz}
-
-    @property
-    def assumed_hover_throttle(self) -> float:
-        return self.parameters.hover_throttle
+        return self.parameters.named | {LOOP_RATE: 1.0 / self.step_s, ACCELEROMETER_FILTER: self.filter_hz}
 
     @property
     def accelerometer(self) -> Filter:
@@ -127,15 +112,10 @@ class ArduPilotLoop:
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:
         return in_newer_names(gains) if self.has_newer_names else dict(gains)
 
-    def rules(self, hover_throttle: float) -> dict[str, dict[str, float]]:
-        """The firmware's defaults, the rule of its documentation, two fixed sets."""
-        by_hover = _with_names((1.0, 5.0, float(f"{hover_throttle:.2g}"), float(f"{2.0 * hover_throttle:.2g}")))
-        fixed = [_with_names(values) for values in ((2.0, 7.0, 1.0, 2.0), (3.0, 8.0, 0.5, 3.0))]
-        return {
-            "ArduCopter's default gains": _with_names((1.0, 5.0, 0.5, 1.0)),
-            f"P = {'0.1 ' if self.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
-            **{f"For comparison: {in_order(self.named(gains))}": gains for gains in fixed},
-        }
+    def documented(self, hover_throttle: float) -> dict[str, dict[str, float]]:
+        p, i = (float(f"{factor * hover_throttle:.2g}") for factor in (1.0, 2.0))
+        name = f"P = {'0.1 ' if self.has_newer_names else ''}hover throttle, I = 2 P"
+        return {name: {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": p, "PSC_ACCZ_I": i}}
 
     def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
         """As Mission Planner and MAVProxy load them."""
@@ -143,25 +123,6 @@ class ArduPilotLoop:
             *(f"# {name} was {value:g}" for name, value in flown.items()),
             *(f"{name},{value:g}" for name, value in proposed.items()),
         ]
-
-    def with_gains(self, gains: Mapping[str, float]) -> Self:
-        return self._with(**{FIRMWARE_NAMES[name][0]: value for name, value in gains.items()})
-
-    def with_hover(self, hover_throttle: float) -> Self:
-        return self._with(hover_throttle=hover_throttle)
-
-    def with_fast_gains(self, factor: float) -> Self:
-        """All feedback passes through the acceleration controller."""
-        p = self.parameters
-        return self._with(
-            acceleration_p=factor * p.acceleration_p,
-            acceleration_i_1_s=factor * p.acceleration_i_1_s,
-            acceleration_d_s=factor * p.acceleration_d_s,
-            acceleration_ff=factor * p.acceleration_ff,
-        )
-
-    def _with(self, **values: float) -> Self:
-        return replace(self, parameters=replace(self.parameters, **values))
 
     def climb_rate_targets(self, segment: Segment) -> Samples:
         p, acceleration = self.parameters.position_p_1_s, self.parameters.acceleration_m_s2
@@ -180,7 +141,7 @@ class ArduPilotLoop:
         return copter.packed(filter_hz=self.filter_hz, dt_s=self.step_s)
 
     def fly(self, run: Run) -> Samples:
-        packed = self.parameters.packed(self.step_s)
+        packed = loop.packed(self.parameters, self.step_s)
         state, flown = np.empty(loop.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
         loop.start_hover(state, packed, *run.start)
         body = start_body(*run.start, run.copter)
@@ -190,20 +151,16 @@ class ArduPilotLoop:
     def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
         """The copter is late by more lag of its motors."""
         late = replace(copter, motor_lag_s=copter.motor_lag_s + late_s)
-        p, packed = self.parameters.packed(self.step_s), self.packed(late)
+        p, packed = loop.packed(self.parameters, self.step_s), self.packed(late)
         return transition_of(lambda nudge: _after_step(p, packed, nudge), len(_DYNAMIC), _NUDGE)
 
 
-def _with_names(values: Sequence[float]) -> dict[str, float]:
-    return dict(zip(SPACE.bounds, values, strict=True))
-
-
-def _after_step(p: Packed, copter: Samples, nudge: Samples) -> Samples:
+def _after_step(p: loop.Packed, copter: Samples, nudge: Samples) -> Samples:
     hover = float(copter[HOVER_THROTTLE])
     state = np.empty(loop.STATE_SIZE)
     loop.start_hover(state, p, hover, 0.0, 0.0, 0.0)
     state[loop.RESET] = 0.0
-    state[loop.ACCELERATION_SUM] = 1000.0 * (hover - p[HOVER])
+    state[loop.ACCELERATION_SUM] = 1000.0 * (hover - p[loop.HOVER])
     state[_DYNAMIC] += nudge[: len(_DYNAMIC)]
     body = start_body(hover, 0.0, 0.0, 0.0, copter) + nudge[len(_DYNAMIC) :]
     step(state, body, p, copter, np.zeros(len(REFERENCE)), np.zeros(len(DISTURBANCES)))

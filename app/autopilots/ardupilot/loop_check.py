@@ -1,14 +1,26 @@
 """ArduCopter's entry in the registry: its on-board log, and traces with a row per step."""
 
 from collections.abc import Iterable, Mapping
+from functools import partial
+from itertools import groupby
 from types import MappingProxyType
 from typing import Final
 
-from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed, replica_of
+import numpy as np
+from numpy.typing import NDArray
+
+from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history, read_ardupilot
+from app.autopilots.ardupilot.replica.parameters import (
+    DEFAULTS,
+    LOOP_RATE,
+    LOOP_RATE_HZ,
+    LOOP_RATES_HZ,
+    UNSUPPORTED,
+    parameters_from,
+)
+from app.autopilots.ardupilot.replica.replay import LoopLog, LoopTrace, replayed, replica_of
 from app.autopilots.ardupilot.replica.vertical import OUTPUTS
-from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
-from app.autopilots.ardupilot.trace import is_ardupilot_trace, read_ardupilot_trace
+from app.autopilots.ardupilot.trace import COLUMNS, read_ardupilot_trace
 from app.autopilots.loop_check import (
     LoopCheck,
     Result,
@@ -19,7 +31,11 @@ from app.autopilots.loop_check import (
     replay_of_log,
     result_of_trace,
 )
+from app.autopilots.recording import Column, Recording, refusal
+from app.core.errors import InputError
+from app.core.records.trajectory import Samples
 from app.logs.formats import Format
+from app.logs.trace_table import has_columns
 
 _PRECISION: Final = "firmware and recording have single precision"
 
@@ -37,6 +53,16 @@ _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     }
 )
 _UP: Final = "Altitude, climb rate and acceleration are positive up."
+_MOTION: Final = (
+    "altitude_m", "desired_altitude_m", "climb_rate_m_s", "desired_climb_rate_m_s", "desired_acceleration_m_s2",
+    "climb_rate_target_m_s",
+)  # fmt: skip
+_GUIDED: Final = 4
+_LIMITED: Final = 1
+_OPTIONS: Final = "GUID_OPTIONS"
+_WAYPOINT_NAVIGATION: Final = 1 << 6
+_HINT: Final = "Give ArduCopter's .bin log of a flight in GUIDED, recorded with NTUN, CTUN and PID in LOG_BITMASK."
+_SAME_LOOP_S: Final = 0.0012
 
 
 def _examine_log(upload: Upload) -> Result:
@@ -72,6 +98,81 @@ def _notes(rows: Mapping[str, int]) -> Iterable[str]:
     yield _UP
 
 
+def ardupilot_loop_log(recording: Recording, *, name: str) -> LoopLog:
+    """The rows in flight of the longest time in GUIDED.
+
+    Raises InputError if there are none, or naming the message or parameter that is missing or not supported.
+    """
+    refused = refusal(f"{name} cannot be compared with the replica.", _HINT, error=InputError)
+    columns = recording.columns
+    if not columns.keys() >= set(_MOTION) or columns["altitude_m"].source != "PSCD.PD":
+        raise refused("PSCD", "is missing: the log does not contain the vertical loop")
+    z, z_d, v, v_d, a_d, v_t = (columns[each].values for each in _MOTION)
+    known = np.isfinite(np.sum((z, z_d, v, v_d, a_d, v_t), axis=0))
+    started_anew = (z_d == z) & (v_d == v)
+    rows, begin_s, end_s = _longest_in_guided(recording, np.flatnonzero(known & ~started_anew))
+    if not rows.size:
+        raise refused("PSCD", "has no row in flight in GUIDED, the mode that the replica computes")
+    time_s = columns["altitude_m"].time_s[rows]
+    values = history(recording, frozenset({*DEFAULTS, *UNSUPPORTED, LOOP_RATE, _OPTIONS})).at(float(time_s[0]))
+    if "PSC_POSZ_P" not in values:
+        raise refused("PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
+    rate_hz = values.get(LOOP_RATE, LOOP_RATE_HZ)
+
+    def logged(name: str) -> Samples:
+        return _of_same_loop(columns.get(name), time_s)
+
+    return LoopLog(
+        parameters=parameters_from(values),
+        rate_hz=rate_hz if LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1] else LOOP_RATE_HZ,
+        time_s=time_s,
+        z_m=z[rows],
+        z_d_m=z_d[rows],
+        v_d_m_s=v_d[rows],
+        a_d_m_s2=a_d[rows],
+        v_t_m_s=v_t[rows],
+        hover=logged("hover_throttle"),
+        control_per_mille=np.sum([logged(f"control_{term}") for term in TERMS], axis=0),
+        throttle=logged("demanded_throttle"),
+        limited=(np.nan_to_num(logged("control_Flags")).astype(np.int64) & _LIMITED) > 0,
+        targets=tuple(target for target in _targets(columns, values) if begin_s <= target[0] < end_s),
+    )
+
+
+def _longest_in_guided(recording: Recording, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], float, float]:
+    """Those of `rows` in the time in GUIDED that has most of them, and its begin and end, s."""
+    time_s, mode = recording.columns["altitude_m"].time_s[rows], recording.columns.get("mode")
+    changes = [] if mode is None else list(zip(mode.time_s.tolist(), mode.values.tolist(), strict=True))
+    begins = [next(same) for _, same in groupby(changes, key=lambda change: change[1])]
+    ends_s = [*(begin_s for begin_s, _ in begins), np.inf][1:]
+    found = [(rows[:0], 0.0, 0.0)]
+    for (begin_s, number), end_s in zip(begins, ends_s, strict=True):
+        if number == _GUIDED:
+            found.append((rows[(time_s >= begin_s) & (time_s < end_s)], begin_s, end_s))
+    return max(found, key=lambda each: len(each[0]))
+
+
+def _targets(columns: Mapping[str, Column], values: Mapping[str, float]) -> list[tuple[float, float]]:
+    """Time and altitude of the position targets; none if others were sent too, or the vehicle plans its way to them."""
+    other = any(np.any(columns[f"target_{each}"].values) for each in NOT_POSITION if f"target_{each}" in columns)
+    planned = int(np.nan_to_num(values.get(_OPTIONS, 0.0))) & _WAYPOINT_NAVIGATION
+    target = columns.get("target_altitude_m")
+    if other or planned or target is None:
+        return []
+    return list(zip(target.time_s.tolist(), target.values.tolist(), strict=True))
+
+
+def _of_same_loop(column: Column | None, time_s: Samples) -> Samples:
+    """A column at the rows of `time_s`, shape (n,); NaN where it has no row of the same loop."""
+    if column is None:
+        return np.full(len(time_s), np.nan)
+    at_s = column.time_s
+    after = np.clip(np.searchsorted(at_s, time_s), 0, len(at_s) - 1)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(np.abs(at_s[after] - time_s) <= np.abs(at_s[before] - time_s), after, before)
+    return np.where(np.abs(at_s[nearest] - time_s) <= _SAME_LOOP_S, column.values[nearest], np.nan)
+
+
 CHECK: Final = LoopCheck(
     recordings="ArduCopter's .bin log of a flight in GUIDED, or a trace of its vertical loop with one row per step, "
     ".csv or .csv.gz",
@@ -81,7 +182,7 @@ CHECK: Final = LoopCheck(
     ),
     note=_UP,
     log=Format.DATAFLASH,
-    is_trace=is_ardupilot_trace,
+    is_trace=partial(has_columns, columns=COLUMNS),
     examine_log=_examine_log,
     examine_trace=_examine_trace,
 )

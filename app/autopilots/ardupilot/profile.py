@@ -5,7 +5,7 @@ from typing import Final
 
 from app.autopilots import commands, mavlink
 from app.autopilots.ardupilot.experiments import EXPERIMENTS, GAINS
-from app.autopilots.ardupilot.replica.parameters import LOOP_NAMES, NEWER_NAMES, UNSUPPORTED
+from app.autopilots.ardupilot.replica.parameters import LOOP_NAMES, NEWER_NAMES, SINCE_4_7, UNSUPPORTED
 from app.autopilots.autopilot import Autopilot, Requirement
 from app.autopilots.commands import Action, Setting, Step, Target
 from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
@@ -26,8 +26,6 @@ _MODE_NAMES: Final = MappingProxyType(
     }
 )  # fmt: skip
 _INTEGRATING: Final = "PSC_ACCZ_I"
-_SINCE_4_7: Final = {older: (newer, 1.0 / factor) for newer, (older, factor) in NEWER_NAMES.items()}
-_RENAMED: Final = frozenset(older for older, _ in NEWER_NAMES.values())
 _LATER: Final = frozenset({*UNSUPPORTED, "PSC_ACCZ_D_FF", "TKOFF_SLEW_TIME", "TKOFF_THR_MAX"})
 """Parameters that were added after the first releases with these gains."""
 _MAY_LACK: Final = _LATER | {
@@ -83,9 +81,9 @@ ARDUPILOT: Final = Autopilot(
     mode_names=_MODE_NAMES,
     gain_sets=(
         on_board(GAINS, integrating=_INTEGRATING),
-        on_board(GAINS, integrating=_INTEGRATING, names=_SINCE_4_7),
+        on_board(GAINS, integrating=_INTEGRATING, names=SINCE_4_7),
     ),
-    loop_parameters=(LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in _RENAMED), *NEWER_NAMES)),
+    loop_parameters=(LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in SINCE_4_7), *NEWER_NAMES)),
     may_lack=_MAY_LACK,
     requirements=(
         Requirement("FS_GCS_ENABLE", "5 (land when the ground station is lost)", frozenset({5.0})),

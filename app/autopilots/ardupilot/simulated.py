@@ -6,7 +6,7 @@ takeoff and targets of position; the S-curves of GUID_OPTIONS bit 6 and targets 
 
 import contextlib
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import ClassVar, Final
 
@@ -62,8 +62,7 @@ _COMMON: Final = (
 
 def _loop() -> tuple[Parameter, ...]:
     """Parameters of the vertical loop, by their names until 4.6, with the firmware's defaults."""
-    defaults = asdict(loop.Parameters(hover_throttle=_HOVER_THROTTLE))
-    known = {name: defaults[field] / factor for name, (field, factor) in loop.FIRMWARE_NAMES.items()}
+    known = loop.Parameters(hover_throttle=_HOVER_THROTTLE).named
     return tuple(real(name, value) for name, value in (known | dict.fromkeys(loop.UNSUPPORTED, 0.0)).items())
 
 

@@ -11,16 +11,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.replica import vertical as loop
-from app.autopilots.ardupilot.replica.parameters import (
-    ACCELERATION,
-    DESCENT,
-    HOVER,
-    HOVER_MAX,
-    HOVER_MIN,
-    JERK,
-    THROTTLE_GAIN,
-    Parameters,
-)
+from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.shaping import inverse_square_root
 from app.autopilots.simulated.body import TICK_S, Body
 from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
@@ -94,9 +85,9 @@ class ArduPilotController(AltitudeController):
 
     def tune(self, parameters: Parameters, *, accelerometer_hz: float, spool_s: float, land_m_s: float) -> None:
         """Use these parameters from the next tick on; `spool_s` is MOT_SPOOL_TIME, `land_m_s` positive."""
-        self._packed = parameters.packed(TICK_S)
+        self._packed = loop.packed(parameters, TICK_S)
         self._landing = self._packed.copy()
-        self._landing[DESCENT] = land_m_s
+        self._landing[loop.DESCENT] = land_m_s
         self._accelerometer.tune(accelerometer_hz)
         self._spool_s = spool_s
 
@@ -147,7 +138,7 @@ class ArduPilotController(AltitudeController):
                 return 0.0
             packed, target_m = self._landing, float(state[loop.Z_D]) - _FAR_BELOW_M
         throttle = state[loop.THROTTLE_FILTERED]
-        throttle += packed[THROTTLE_GAIN] * (state[loop.THROTTLE] - throttle)
+        throttle += packed[loop.THROTTLE_GAIN] * (state[loop.THROTTLE] - throttle)
         self.inputs[0] = target_m, body.altitude_m, body.climb_rate_m_s, acceleration, throttle <= 0.0, throttle >= 1.0
         loop.rollout(state, packed, self.inputs, self.outputs, self._followed, self.outputs)
         if self.phase is Phase.CLIMBING and abs(self._target_m - state[loop.Z_D]) < _ARRIVED_WITHIN_M:
@@ -158,11 +149,11 @@ class ArduPilotController(AltitudeController):
         """Return the hover throttle, corrected by that of this tick (MOT_HOVER_LEARN), or None unless it hovers."""
         if self.phase is not Phase.HOLDING or abs(self._body.climb_rate_m_s) >= _LEARNING_BELOW_M_S:
             return None
-        throttle, hover = float(self._state[loop.THROTTLE_FILTERED]), float(self._packed[HOVER])
+        throttle, hover = float(self._state[loop.THROTTLE_FILTERED]), float(self._packed[loop.HOVER])
         if throttle <= 0.0 or abs(self._state[loop.V_D]) >= _AT_REST_M_S:
             return None
         hover += TICK_S / (TICK_S + _LEARNING_S) * (throttle - hover)
-        self._packed[HOVER] = self._landing[HOVER] = hover = min(max(hover, HOVER_MIN), HOVER_MAX)
+        self._packed[loop.HOVER] = self._landing[loop.HOVER] = hover = min(max(hover, loop.HOVER_MIN), loop.HOVER_MAX)
         return hover
 
     # ------------------------------------------------------------ telemetry
@@ -194,5 +185,5 @@ class ArduPilotController(AltitudeController):
 
     def _stopping_distance_m(self, climb_m_s: float) -> float:
         """Distance in which the trajectory comes to rest from this climb rate."""
-        acceleration, jerk = self._packed[ACCELERATION], self._packed[JERK]
+        acceleration, jerk = self._packed[loop.ACCELERATION], self._packed[loop.JERK]
         return inverse_square_root(climb_m_s, 0.5 * jerk / acceleration, 0.5 * acceleration)

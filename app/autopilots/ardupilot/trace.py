@@ -8,7 +8,7 @@ import numpy as np
 from app.autopilots.ardupilot.replica.parameters import parameters_from
 from app.autopilots.ardupilot.replica.replay import Hover, LoopTrace
 from app.autopilots.ardupilot.replica.vertical import INPUTS, OUTPUTS
-from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
+from app.logs.trace_table import TraceChecks, TraceTable, read_trace_table
 
 COLUMNS: Final = ("t_s", *INPUTS, *OUTPUTS)
 _HINT: Final = (
@@ -19,11 +19,6 @@ _FLAGS: Final = ("limit_lower", "limit_upper")
 _IN_SI: Final = {"WPNAV_SPEED_UP_m_s", "WPNAV_SPEED_DN_m_s", "WPNAV_ACCEL_Z_m_s2"}
 _CM: Final = 100.0
 _START: Final = ("z_m", "v_m_s", "a_m_s2", "throttle")
-
-
-def is_ardupilot_trace(beginning: bytes) -> bool:
-    """Whether a file with this beginning is such a run."""
-    return has_columns(beginning, COLUMNS)
 
 
 def read_ardupilot_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
@@ -47,8 +42,7 @@ def _columns(table: TraceTable, names: tuple[str, ...]) -> np.ndarray[tuple[int,
 
 def _values(checks: TraceChecks, described: Mapping[str, object]) -> dict[str, float]:
     """The firmware's parameters by name, in its units; those of WPNAV may be recorded in m instead of cm."""
-    given = checks.object_in(described, "params")
-    values = {each: checks.number_in(given, each) for each in given}
+    values = checks.numbers_in(described, "params")
     for each in _IN_SI & values.keys():
         values[each.partition("_m_")[0]] = values.pop(each) * _CM
     slew = {each: described[each] for each in ("TKOFF_SLEW_TIME", "TKOFF_THR_MAX") if described.get(each) is not None}

@@ -10,6 +10,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.autopilots.paparazzi.replica.loop_log import FIELDS, LoopLog
+from app.autopilots.recording import increasing
 from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 from app.logs.base import refused
 from app.logs.formats import is_ground_log
@@ -36,9 +37,7 @@ class GroundLog:
     def loop_log(self) -> LoopLog:
         """The samples whose time increases."""
         time_s, values = np.array(self.loop_time_s), np.array(self.loop, dtype=np.int64).reshape(-1, len(FIELDS))
-        rising = np.ones(len(time_s), dtype=np.bool_)
-        rising[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
-        return LoopLog(time_s[rising], values[rising])
+        return LoopLog(time_s, values).part(increasing(time_s))
 
 
 def read_lines(stream: BinaryIO) -> GroundLog:

@@ -15,13 +15,12 @@ from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
 from app.autopilots.px4.loop import SPACE, Px4Loop
 from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
-from app.autopilots.recording import LONGEST_INTERVAL_S, Parameters, Recording, Refused, Rows, refusal
+from app.autopilots.recording import LONGEST_INTERVAL_S, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
     LARGEST_LEAN,
     SHORTEST_PART_S,
     choose_parts,
     jumps,
-    require_gains,
     thinned,
 )
 from app.core.analysis.flight import LoggedFlight
@@ -97,9 +96,10 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
         _manoeuvres(rows),
         refused,
         (TARGET, none_found),
+        SPACE.bounds,
+        lambda _: "is missing",
     )
-    require_gains(given, SPACE.bounds, refused, lambda _: "is missing")
-    parameters = parameters_from(given)
+    parameters, logged_s = parameters_from(given), recording.columns["altitude_m"].interval_s
     limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
     hover = _hover(rows, acceleration_target, is_sound & (thrust > limits[0]) & (thrust < limits[1]))
     kept = [thinned(time_s, part) for part in chosen]
@@ -107,7 +107,7 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
     return LoggedFlight(
         loop=Px4Loop(
             parameters=parameters,
-            step_s=_step_s(recording.columns["altitude_m"].interval_s, given),
+            step_s=logged_s if 0.0 < logged_s <= _EVERY_POSITION_S else estimator_step_s(given),
             row_s=float(np.median(np.concatenate([np.diff(time_s[each]) for each in kept]))),
             descent_m_s=float(np.median(down)) if np.isfinite(down).all() else parameters.descent_m_s,
             hover_deviation=hover_deviation(given),
@@ -200,12 +200,6 @@ def _manoeuvres(rows: Segment) -> Samples:
     """Acceleration that the reference alone asks for, shape (n,): steps of the altitude count too."""
     target, time_s = rows.v_d_m_s + rows.z_d_m, rows.time_s
     return np.diff(target, prepend=target[0]) / np.diff(time_s, prepend=time_s[0] - 1.0) + rows.a_d_m_s2
-
-
-def _step_s(logged_s: float, given: Parameters) -> float:
-    """Interval of the estimates, s: as logged, or where not all were, as the estimator's parameters say, in whole
-    intervals of the IMU."""
-    return logged_s if 0.0 < logged_s <= _EVERY_POSITION_S else estimator_step_s(given)
 
 
 def _feed_forward(recording: Recording, time_s: Samples) -> tuple[Samples, Samples]:

@@ -9,6 +9,7 @@ import numpy as np
 from app.autopilots.px4.profile import PX4
 from app.autopilots.px4.replica.parameters import LOOP_NAMES
 from app.autopilots.recording import (
+    COMMANDS,
     Column,
     Event,
     EventKind,
@@ -67,7 +68,6 @@ SOURCES: Final[Mapping[str, Source]] = {
 than its target."""
 VEHICLE: Final = "MAV_SYS_ID"
 
-_TAKE_OFF, _LAND = 22, 21
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
@@ -106,10 +106,9 @@ def _commands(topics: Mapping[str, Table]) -> Iterator[Event]:
     refusals = [(time_s, command) for time_s, command, result in answers if result]
     for time_s, command in rows_of(topics.get(_COMMAND, {}), "timestamp", "command"):
         refused_at = [at for at, what in refusals if what == command and 0.0 <= at - time_s <= _ANSWERED_WITHIN_S]
-        if command == _TAKE_OFF and not refused_at:
-            yield Event(EventKind.TAKEOFF, time_s, "the command NAV_TAKEOFF")
-        elif command == _LAND and not refused_at:
-            yield Event(EventKind.COMMAND, time_s, "the command NAV_LAND")
+        if command in COMMANDS and not refused_at:
+            kind, what = COMMANDS[command]
+            yield Event(kind, time_s, what)
 
 
 def _changes(recording: Recording) -> Iterator[Event]:

@@ -1,18 +1,17 @@
 """PX4's altitude loop as an analysis takes it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.copter_loop import CopterLoop
 from app.autopilots.px4.replica import vertical as loop
 from app.autopilots.px4.replica.copter import fly
 from app.autopilots.px4.replica.parameters import (
-    FIRMWARE_NAMES,
-    GAINS,
     HOVER_RANGE,
     HOVER_RANGE_NAME,
     HOVER_THRUSTS,
@@ -22,7 +21,7 @@ from app.autopilots.px4.replica.parameters import (
     step_parameters,
 )
 from app.core.analysis.hover import found_hover
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps, interpolated
 from app.core.models.copter import (
     DISTURBANCES,
@@ -84,7 +83,7 @@ _AT_LIMIT: Final = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Px4Loop:
+class Px4Loop(CopterLoop):
     """The loop (`AltitudeLoop`), with the limits of its mode.
 
     The acceleration in the log is the change of the climb rate over `row_s`, a whole number of steps. The estimated
@@ -92,7 +91,6 @@ class Px4Loop:
     """
 
     parameters: Parameters
-    step_s: float
     row_s: float
     descent_m_s: float
     hover_deviation: float = HOVER_RANGE
@@ -100,22 +98,15 @@ class Px4Loop:
 
     texts = _TEXTS
     space = SPACE
+    fast = ("MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC")
+    compared = ((1.5, 8.0, 3.0, 0.0), (1.5, 6.0, 3.0, 0.3))
     usual_slope = (1.25, 0.35)
     slope_error = 0.06
     target_tolerance_m_s = 0.1
 
     @property
-    def gains(self) -> dict[str, float]:
-        return self.parameters.gains
-
-    @property
     def firmware_parameters(self) -> dict[str, float]:
-        values = {name: getattr(self.parameters, field) for name, field in FIRMWARE_NAMES.items()}
-        return values | {HOVER_RANGE_NAME: self.hover_deviation} | step_parameters(self.step_s)
-
-    @property
-    def assumed_hover_throttle(self) -> float:
-        return self.parameters.hover_thrust
+        return self.parameters.named | {HOVER_RANGE_NAME: self.hover_deviation} | step_parameters(self.step_s)
 
     @property
     def hover_limits(self) -> tuple[float, float]:
@@ -134,17 +125,6 @@ class Px4Loop:
         """The same: the loop controls no measured acceleration."""
         return self.accelerometer
 
-    def named(self, gains: Mapping[str, float]) -> dict[str, float]:
-        return dict(gains)
-
-    def rules(self, hover_throttle: float) -> dict[str, dict[str, float]]:  # noqa: ARG002
-        """The firmware's defaults, two fixed sets."""
-        fixed = [_with_names(values) for values in ((1.5, 8.0, 3.0, 0.0), (1.5, 6.0, 3.0, 0.3))]
-        return {
-            "PX4's default gains": _with_names((1.0, 4.0, 2.0, 0.0)),
-            **{f"For comparison: {in_order(gains)}": gains for gains in fixed},
-        }
-
     def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
         """As QGroundControl loads them: vehicle, component, name, value and MAVLink type, separated by tabs."""
         return [
@@ -152,24 +132,6 @@ class Px4Loop:
             "# Vehicle-Id Component-Id Name Value Type",
             *(f"{self.vehicle}\t1\t{name}\t{value:g}\t{_REAL32}" for name, value in proposed.items()),
         ]
-
-    def with_gains(self, gains: Mapping[str, float]) -> Self:
-        return self._with(**{FIRMWARE_NAMES[name]: value for name, value in gains.items()})
-
-    def with_hover(self, hover_throttle: float) -> Self:
-        return self._with(hover_thrust=hover_throttle)
-
-    def with_fast_gains(self, factor: float) -> Self:
-        """All feedback passes through the velocity controller."""
-        p = self.parameters
-        return self._with(
-            velocity_p_1_s=factor * p.velocity_p_1_s,
-            velocity_i_1_s2=factor * p.velocity_i_1_s2,
-            velocity_d=factor * p.velocity_d,
-        )
-
-    def _with(self, **values: float) -> Self:
-        return replace(self, parameters=replace(self.parameters, **values))
 
     def climb_rate_targets(self, segment: Segment) -> Samples:
         p = self.parameters
@@ -207,7 +169,7 @@ class Px4Loop:
         return flown
 
     def _flown(self, run: Run) -> Samples:
-        packed, inputs = self.parameters.packed(self.step_s), self._inputs()
+        packed, inputs = loop.packed(self.parameters, self.step_s), self._inputs()
         state, outputs = np.empty(loop.STATE_SIZE, dtype=np.float32), np.empty((1, len(loop.OUTPUTS)), dtype=np.float32)
         throttle, _, v_m_s, _ = run.start
         loop.start_hover(state, packed, float(run.reference[0, 3]), throttle, -v_m_s)
@@ -222,7 +184,7 @@ class Px4Loop:
     def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
         """With the hover throttle of the vehicle as PX4 estimates it in flight. The copter is late by dead time, in
         whole steps: with more lag alone, a loop without a filter of its throttle hardly ever rings."""
-        packed, p = self.packed(copter), self.parameters.packed(self.step_s)
+        packed, p = self.packed(copter), loop.packed(self.parameters, self.step_s)
         hover = float(packed[HOVER_THROTTLE])
         estimate = found_hover(self, hover)
         reference, still = np.array([[0.0, 0.0, 0.0, estimate]]), np.zeros((1, len(DISTURBANCES)))
@@ -258,10 +220,6 @@ class Px4Loop:
         for name, value in given.items():
             inputs[0, loop.INPUTS.index(name)] = value
         return inputs
-
-
-def _with_names(values: Sequence[float]) -> dict[str, float]:
-    return dict(zip(GAINS, values, strict=True))
 
 
 def _late(together: Samples, body: Samples, steps: int) -> Samples:

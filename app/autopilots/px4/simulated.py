@@ -7,7 +7,6 @@ position, velocity and acceleration, of which only the vertical parts act.
 import contextlib
 import math
 import struct
-from dataclasses import asdict
 from types import MappingProxyType
 from typing import ClassVar, Final
 
@@ -58,9 +57,6 @@ _OFFBOARD_ACTIONS: Final = dict.fromkeys((0, 1, 2, 5), Reaction.HOLD)
 _FENCE_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.WARN, 2: Reaction.HOLD}
 
 
-_LOOP_DEFAULTS: Final = asdict(loop.Parameters())
-
-
 def custom_mode(main: int, sub: int = 0) -> int:
     """Return the mode as in HEARTBEAT."""
     return main << 16 | sub << 24
@@ -74,7 +70,7 @@ class Px4(Copter):
         autopilot=12,
         version=0x011000FF,
         parameters=(
-            *(real(name, _LOOP_DEFAULTS[field]) for name, field in loop.FIRMWARE_NAMES.items()),
+            *(real(name, value) for name, value in loop.DEFAULTS.items()),
             *(real(name, 0.0) for name in loop.UNSUPPORTED),
             real("MPC_TKO_SPEED", 1.5),
             real("MPC_Z_V_AUTO_UP", 3.0),

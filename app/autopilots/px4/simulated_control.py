@@ -68,7 +68,7 @@ class Px4Controller(AltitudeController):
     def tune(self, values: Mapping[str, float]) -> None:
         """Use these parameters, by the firmware's names, from the next run on. Raises InputError if the loop is not
         defined for them."""
-        self._packed = parameters_from(values).packed(LOOP_S)
+        self._packed = loop.packed(parameters_from(values), LOOP_S)
         positive = {name: max(value, _LEAST) for name, value in values.items()}
         jerk = positive["MPC_JERK_AUTO"]
         self._up = Limits(positive["MPC_Z_V_AUTO_UP"], positive["MPC_ACC_UP_MAX"], jerk)

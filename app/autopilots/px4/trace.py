@@ -1,6 +1,5 @@
 """Reader of recorded runs of PX4's vertical loop: described CSV, one row per estimate of position (`trace_table`)."""
 
-from collections.abc import Mapping
 from typing import BinaryIO, Final
 
 import numpy as np
@@ -9,7 +8,7 @@ from app.autopilots.px4.replica.parameters import STEP_S, parameters_from
 from app.autopilots.px4.replica.replay import LoopTrace
 from app.autopilots.px4.replica.vertical import INPUTS, OUTPUTS
 from app.core.records.trajectory import Samples
-from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
+from app.logs.trace_table import TraceChecks, TraceTable, read_trace_table
 
 _DERIVATIVE: Final = "z_derivative_m_s"
 _NEW: Final = "set_new"
@@ -30,11 +29,6 @@ _HINT: Final = (
 )
 
 
-def is_px4_trace(beginning: bytes) -> bool:
-    """Whether a file with this beginning is such a run."""
-    return has_columns(beginning, COLUMNS)
-
-
 def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
     """Read a run, plain or gzipped. Where they were not recorded, the derivative of z is the difference of z, and
     set-points count as new in a row where they change, under offboard control and outside of a flight in every row.
@@ -49,7 +43,7 @@ def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
     known = derived | dict(table.columns)
     inputs = np.ascontiguousarray(np.column_stack([known[each] for each in INPUTS]))
     return LoopTrace(
-        parameters=parameters_from(_values(checks, described)),
+        parameters=parameters_from(checks.numbers_in(described, "parameters")),
         filter_sample_s=checks.positive_in({"filter_sample_s": STEP_S} | dict(described), "filter_sample_s"),
         flown=_MODE in known,
         time_s=table["time_s"],
@@ -79,9 +73,3 @@ def _late(table: TraceTable, inputs: Samples) -> Samples:
 def _outputs(table: TraceTable) -> Samples:
     unknown = np.full(len(table), np.nan)
     return np.ascontiguousarray(np.column_stack([table.columns.get(each, unknown) for each in OUTPUTS]))
-
-
-def _values(checks: TraceChecks, described: Mapping[str, object]) -> dict[str, float]:
-    """The firmware's parameters by name."""
-    given = checks.object_in(described, "parameters")
-    return {each: checks.number_in(given, each) for each in given}

@@ -77,7 +77,7 @@ def test_what_flew_well_does_not(copter: Copter, gains: tuple[float, float, floa
 def test_the_damping_is_that_of_an_oscillation_as_it_dies_away() -> None:
     """The racer with 1.3 times the default gains of the acceleration, pushed: peaks of its acceleration above 5 Hz."""
     gains = flown_with(RACER, (1.0, 5.0, 0.65, 1.3))
-    packed = gains.parameters.packed()
+    packed = loop.packed(gains.parameters)
     copter = gains.packed(RACER)
     state, flown = np.empty(loop.STATE_SIZE), np.empty((800, len(FLOWN)))
     loop.start_hover(state, packed, RACER.hover_throttle, 0.0, 0.0, 0.0)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.autopilots.ardupilot.recorded_flight import ardupilot_loop, read_ardupilot, shaped_reference
-from app.autopilots.px4.recorded_flight import px4_loop, read_px4
+from app.autopilots.ardupilot.experiments import ardupilot_loop, read_ardupilot, shaped_reference
+from app.autopilots.px4.experiments import px4_loop, read_px4
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.recorded_flight import Steps
 from app.core.analysis.segment import FinerSegment

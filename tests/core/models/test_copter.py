@@ -31,7 +31,7 @@ PARAMETERS = Parameters(hover_throttle=0.4)
 
 def flown(disturbances: Samples, *, parameters: Parameters = PARAMETERS, z_m: float = 0.0) -> Samples:
     """Flight about the altitude 0, shape (n, 6), from hover."""
-    packed, copter = parameters.packed(), COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
+    packed, copter = loop.packed(parameters), COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
     state, found = np.empty(loop.STATE_SIZE), np.empty((len(disturbances), len(FLOWN)))
     loop.start_hover(state, packed, COPTER.hover_throttle, z_m, 0.0, 0.0)
     body = start_body(COPTER.hover_throttle, z_m, 0.0, 0.0, copter)
@@ -71,7 +71,7 @@ def test_a_step_without_control_obeys_the_equation_of_motion() -> None:
         position_p_1_s=1e-9, velocity_p_1_s=0.0, acceleration_p=0.0, acceleration_i_1_s=0.0, hover_throttle=0.44
     )
     copter = COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
-    packed, state = idle.packed(), np.empty(loop.STATE_SIZE)
+    packed, state = loop.packed(idle), np.empty(loop.STATE_SIZE)
     loop.start_hover(state, packed, 0.44, 0.0, 2.0, 0.0)
     body = start_body(0.44, 0.0, 2.0, 0.0, copter)
     step(state, body, packed, copter, np.zeros(3), np.array([0.5, 0.125, 0.0]))
@@ -109,7 +109,7 @@ def test_filters_begin_at_rest() -> None:
 def test_a_body_begins_at_rest_behind_its_filter() -> None:
     copter = COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
     body = start_body(0.4, 1.0, 0.0, 0.5, copter)
-    state, packed = np.empty(loop.STATE_SIZE), PARAMETERS.packed()
+    state, packed = np.empty(loop.STATE_SIZE), loop.packed(PARAMETERS)
     loop.start_hover(state, packed, 0.4, 1.0, 0.0, 0.5)
     step(state, body, packed, copter, np.array([1.0, 0.0, 0.5]), np.array([0.5, 0.0, 0.0, 0.0]))
     assert body[SENSED] == pytest.approx(0.5)

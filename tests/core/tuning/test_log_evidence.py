@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.ardupilot.experiments import ardupilot_loop
 from app.autopilots.ardupilot.loop import ArduPilotLoop
-from app.autopilots.ardupilot.recorded_flight import ardupilot_loop
 from app.autopilots.ardupilot.replica.parameters import Parameters
+from app.autopilots.ardupilot.replica.vertical import packed
 from app.autopilots.experiments import experiment_of, space_of
+from app.autopilots.px4.experiments import px4_loop
 from app.autopilots.px4.loop import Px4Loop
-from app.autopilots.px4.recorded_flight import px4_loop
 from app.autopilots.px4.replica.parameters import Parameters as Px4Parameters
 from app.core.definition import Definition, LogEvidence, Start
 from app.core.experiments.base import prior_distribution
@@ -88,7 +89,7 @@ def test_the_parameters_of_a_loop_describe_it() -> None:
     )
     found = ardupilot_loop(ardupilot.firmware_parameters)
     assert (found.step_s, found.filter_hz) == pytest.approx((1 / 300, 10.0))
-    assert found.parameters.packed() == pytest.approx(ardupilot.parameters.packed())
+    assert packed(found.parameters) == pytest.approx(packed(ardupilot.parameters))
     px4 = Px4Loop(parameters=Px4Parameters(climb_m_s=1.2), step_s=0.004, row_s=0.1, descent_m_s=1.0)
     again = px4_loop(px4.firmware_parameters)
     assert again.step_s == pytest.approx(0.004)

@@ -2,14 +2,16 @@
 
 import numpy as np
 
-from app.autopilots.ardupilot.replica.parameters import DT, THROTTLE_GAIN, Packed
 from app.autopilots.ardupilot.replica.vertical import (
     A_D,
+    DT,
     STATE_SIZE,
     THROTTLE,
     THROTTLE_FILTERED,
+    THROTTLE_GAIN,
     V_D,
     Z_D,
+    Packed,
     State,
     control,
     shape,

@@ -8,7 +8,7 @@ the next.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ SHAPED: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
 _LONGEST_INTERVAL_S: Final = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class Hover:
+class Hover(NamedTuple):
     """A start in flight: throttle demanded and filtered, altitude in m, climb rate in m/s and acceleration in m/s²."""
 
     throttle: float
@@ -60,12 +59,11 @@ class LoopTrace:
 
 def replayed(trace: LoopTrace) -> Samples:
     """The replica's own outputs, shape (n, 8): free running, except after the rows in `followed`."""
-    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), trace.parameters.packed(trace.dt_s)
+    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), loop.packed(trace.parameters, trace.dt_s)
     if trace.hover is None:
         loop.start_takeoff(state, packed, 0.0)
     else:
-        hover = trace.hover
-        loop.start_hover(state, packed, hover.throttle, hover.z_m, hover.v_m_s, hover.a_m_s2)
+        loop.start_hover(state, packed, *trace.hover)
     computed = np.empty_like(trace.outputs)
     loop.rollout(state, packed, trace.inputs, trace.outputs, trace.followed, computed)
     return computed
@@ -134,6 +132,6 @@ def _advance(
     """Take the loop's steps between two rows; a target counts from the step after its receipt."""
     steps = max(1, round((end_s - begin_s) * log.rate_hz))
     dt_s = (end_s - begin_s) / steps
-    packed = log.parameters.packed(dt_s)
+    packed = loop.packed(log.parameters, dt_s)
     for step in range(1, steps + 1):
         loop.shape(state, packed, [z for time_s, z in targets if time_s < begin_s + step * dt_s][-1])

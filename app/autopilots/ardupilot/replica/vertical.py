@@ -12,36 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.ardupilot.replica.parameters import (
-    ACCELERATION,
-    ACCELERATION_D,
-    ACCELERATION_D_FF,
-    ACCELERATION_DERIVATIVE_GAIN,
-    ACCELERATION_ERROR_GAIN,
-    ACCELERATION_FF,
-    ACCELERATION_I,
-    ACCELERATION_IMAX,
-    ACCELERATION_P,
-    CLIMB,
-    DESCENT,
-    DT,
-    HOVER,
-    JERK,
-    POSITION_P,
-    RAMP_END,
-    RAMP_STEP,
-    RELAXATION_GAIN,
-    TARGET_GAIN,
-    THROTTLE_GAIN,
-    VELOCITY_D,
-    VELOCITY_DERIVATIVE_GAIN,
-    VELOCITY_ERROR_GAIN,
-    VELOCITY_FF,
-    VELOCITY_I,
-    VELOCITY_IMAX,
-    VELOCITY_P,
-    Packed,
-)
+from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters, low_pass_gain
 from app.autopilots.ardupilot.replica.shaping import (
     LARGEST_DESCENT_ACCELERATION_M_S2,
     approach_rate,
@@ -53,35 +24,31 @@ from app.autopilots.ardupilot.replica.shaping import (
 )
 from app.core.kernels import kernel
 
+HOVER_MIN: Final = 0.125
+HOVER_MAX: Final = 0.6875
+
+(
+    POSITION_P, VELOCITY_P, VELOCITY_I, VELOCITY_D, VELOCITY_FF, VELOCITY_IMAX, VELOCITY_ERROR_GAIN,
+    VELOCITY_DERIVATIVE_GAIN, ACCELERATION_P, ACCELERATION_I, ACCELERATION_D, ACCELERATION_FF, ACCELERATION_D_FF,
+    ACCELERATION_IMAX, TARGET_GAIN, ACCELERATION_ERROR_GAIN, ACCELERATION_DERIVATIVE_GAIN, JERK, CLIMB, DESCENT,
+    ACCELERATION, HOVER, RAMP_STEP, RAMP_END, DT, THROTTLE_GAIN, RELAXATION_GAIN,
+) = range(27)  # fmt: skip
+"""Indices in the packed parameters: of the fields of `Parameters`, in their order, then of what follows from the step
+alone."""
+
+Packed = NDArray[np.float64]
+
 SPOOL: Final = 0.0
 RAMP: Final = 1.0
 FLIGHT: Final = 2.0
 """Phases: motors spooling up, throttle rising on the ground, the controllers in control."""
 
-# Indices in the state array.
-Z_D: Final = 0
-V_D: Final = 1
-A_D: Final = 2
-V_T: Final = 3
-A_T: Final = 4
-ACCELERATION_SUM: Final = 5
-THROTTLE: Final = 6
-THROTTLE_FILTERED: Final = 7
-POSITION_ERROR: Final = 8
-POSITION_ERROR_MIN: Final = 9
-POSITION_ERROR_MAX: Final = 10
-VELOCITY_ERROR: Final = 11
-VELOCITY_DERIVATIVE: Final = 12
-VELOCITY_SUM: Final = 13
-FILTERED_TARGET: Final = 14
-ACCELERATION_ERROR: Final = 15
-ACCELERATION_DERIVATIVE: Final = 16
-SATURATED: Final = 17
-RESET: Final = 18
-PHASE: Final = 19
-SPOOL_LEFT_S: Final = 20
-UNFILTERED: Final = 21
-STATE_SIZE: Final = 22
+(
+    Z_D, V_D, A_D, V_T, A_T, ACCELERATION_SUM, THROTTLE, THROTTLE_FILTERED, POSITION_ERROR, POSITION_ERROR_MIN,
+    POSITION_ERROR_MAX, VELOCITY_ERROR, VELOCITY_DERIVATIVE, VELOCITY_SUM, FILTERED_TARGET, ACCELERATION_ERROR,
+    ACCELERATION_DERIVATIVE, SATURATED, RESET, PHASE, SPOOL_LEFT_S, UNFILTERED, STATE_SIZE,
+) = range(23)  # fmt: skip
+"""Indices in the state array."""
 
 State = NDArray[np.float32 | np.float64]
 """What the loop remembers: in single precision, as in the firmware, it follows a recording; in double precision it is
@@ -93,8 +60,27 @@ OUTPUTS: Final = (
 )  # fmt: skip
 """The first elements of the state array."""
 
+_THROTTLE_FILTER_HZ: Final = 2.0
+_RELAXATION_S: Final = 0.16
+_RAMP_END: Final = 0.9
+_FILTERS: Final = (
+    VELOCITY_ERROR_GAIN, VELOCITY_DERIVATIVE_GAIN, TARGET_GAIN, ACCELERATION_ERROR_GAIN, ACCELERATION_DERIVATIVE_GAIN,
+)  # fmt: skip
 _RAMP_END_ACCELERATION: Final = 0.5
 _RAMP_END_CLIMB: Final = 0.1
+
+
+def packed(parameters: Parameters, dt_s: float = STEP_S) -> Packed:
+    """Constants of a step of `dt_s`, shape (27,), for the kernels."""
+    p = [*parameters.values, dt_s, low_pass_gain(_THROTTLE_FILTER_HZ, dt_s), dt_s / (dt_s + _RELAXATION_S)]
+    for place in _FILTERS:
+        p[place] = low_pass_gain(p[place], dt_s)
+    p[JERK] = parameters.shaping_jerk_m_s3
+    p[HOVER] = min(max(p[HOVER], HOVER_MIN), HOVER_MAX)
+    p[ACCELERATION_IMAX] = max(p[ACCELERATION_IMAX], 1000.0 * p[HOVER])
+    p[RAMP_STEP] = dt_s / p[RAMP_STEP]
+    p[RAMP_END] = min(p[RAMP_END], _RAMP_END)
+    return np.array(p)
 
 
 @kernel

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.px4.replica.parameters import Packed
-from app.autopilots.px4.replica.vertical import THRUST, State, rollout
+from app.autopilots.px4.replica.vertical import THRUST, Packed, State, rollout
 from app.core.kernels import kernel
 from app.core.models.copter import ALTITUDE, CLIMB_RATE, SENSED, advance
 from app.core.records.trajectory import Samples

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.replica import vertical as loop
-from app.autopilots.px4.replica.parameters import Packed, Parameters
+from app.autopilots.px4.replica.parameters import Parameters
 from app.core.records.trajectory import Samples
 
 _SET_POINTS: Final = [loop.INPUTS.index(name) for name in ("set_z_m", "set_vz_m_s", "set_az_m_s2")]
@@ -63,7 +63,7 @@ def replayed(trace: LoopTrace) -> Replay:
 def _run(trace: LoopTrace, *, armed_before: bool) -> Replay:
     inputs, late = trace.inputs.astype(np.float32), trace.late_inputs.astype(np.float32)
     recorded = ~np.isnan(trace.outputs).all(axis=0)
-    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), trace.parameters.packed(trace.filter_sample_s)
+    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), loop.packed(trace.parameters, trace.filter_sample_s)
     loop.start(state, packed)
     if armed_before:
         state, _ = _after(state, packed, inputs[:1])
@@ -82,7 +82,7 @@ def _run(trace: LoopTrace, *, armed_before: bool) -> Replay:
     return Replay(np.concatenate(computed), tuple(late_rows), armed_before)
 
 
-def _after(state: loop.State, packed: Packed, inputs: NDArray[np.float32]) -> tuple[loop.State, Samples]:
+def _after(state: loop.State, packed: loop.Packed, inputs: NDArray[np.float32]) -> tuple[loop.State, Samples]:
     """State after these rows, and their outputs, shape (n, 6)."""
     state, outputs = state.copy(), np.empty((len(inputs), len(loop.OUTPUTS)), dtype=np.float32)
     loop.rollout(state, packed, inputs, outputs)
@@ -167,7 +167,7 @@ def _acceleration_targets(log: LoopLog) -> Samples:
     targets = np.full(len(log.place), np.nan)
     if len(log.place) < 2:
         return targets
-    packed = log.parameters.packed(float(np.median(np.diff(log.time_s))))
+    packed = loop.packed(log.parameters, float(np.median(np.diff(log.time_s))))
     inputs = _inputs(log)
     state = np.empty(loop.STATE_SIZE, dtype=np.float32)
     loop.start(state, packed)

@@ -14,25 +14,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.px4.replica.parameters import (
-    CLIMB,
-    DERIVATIVE_GAIN,
-    HOVER,
-    LAND_SPEED,
-    POSITION_P,
-    RAMP_S,
-    SPOOL_S,
-    THRUST_MAX,
-    THRUST_MIN,
-    VELOCITY_D,
-    VELOCITY_GAIN,
-    VELOCITY_I,
-    VELOCITY_P,
-    Packed,
-)
+from app.autopilots.px4.replica.parameters import STEP_S, Parameters, low_pass_gain
 from app.core.kernels import kernel
 
 GRAVITY: Final = np.float32(9.80665)
+
+(
+    POSITION_P, VELOCITY_P, VELOCITY_I, VELOCITY_D, CLIMB, DESCENT, THRUST_MIN, THRUST_MAX, HOVER, RAMP_S, SPOOL_S,
+    VELOCITY_GAIN, DERIVATIVE_GAIN, LAND_SPEED,
+) = range(14)  # fmt: skip
+"""Indices in the packed parameters: of the fields of `Parameters`, in their order."""
+
+Packed = NDArray[np.float32]
 
 DISARMED: Final = np.float32(1.0)
 SPOOL_UP: Final = np.float32(2.0)
@@ -41,22 +34,11 @@ RAMP_UP: Final = np.float32(4.0)
 FLIGHT: Final = np.float32(5.0)
 """States of a takeoff, numbered as PX4's."""
 
-# Indices in the state array.
-TAKEOFF: Final = 0
-VELOCITY_TARGET: Final = 1
-ACCELERATION_TARGET: Final = 2
-THRUST: Final = 3
-RAMP_SPEED: Final = 4
-DERIVATIVE: Final = 5
-VELOCITY: Final = 6
-INTEGRAL: Final = 7
-HOVER_THRUST: Final = 8
-RAMP: Final = 9
-ARMED_S: Final = 10
-SET_Z: Final = 11
-SET_VELOCITY: Final = 12
-SET_ACCELERATION: Final = 13
-STATE_SIZE: Final = 14
+(
+    TAKEOFF, VELOCITY_TARGET, ACCELERATION_TARGET, THRUST, RAMP_SPEED, DERIVATIVE, VELOCITY, INTEGRAL, HOVER_THRUST,
+    RAMP, ARMED_S, SET_Z, SET_VELOCITY, SET_ACCELERATION, STATE_SIZE,
+) = range(15)  # fmt: skip
+"""Indices in the state array."""
 
 State = NDArray[np.float32]
 Single = np.float32
@@ -80,6 +62,17 @@ _NONE: Final = np.float32(0.0)
 _WHOLE: Final = np.float32(1.0)
 _SUM_ERROR_S: Final = np.float32(1e-4)
 """What the sum of many intervals may lack to the time of the firmware's clock."""
+
+
+def packed(parameters: Parameters, filter_sample_s: float = STEP_S) -> Packed:
+    """Constants for the kernels, shape (14,).
+
+    `filter_sample_s` is the mean interval of the estimates until the filters were set up, s, positive.
+    """
+    p = parameters.values
+    for place in (VELOCITY_GAIN, DERIVATIVE_GAIN):
+        p[place] = low_pass_gain(p[place], filter_sample_s)
+    return np.array(p, dtype=np.float32)
 
 
 @kernel

@@ -3,16 +3,13 @@ import math
 import pytest
 
 from app.autopilots.ardupilot.replica.parameters import (
-    ACCELERATION_IMAX,
-    HOVER,
-    RAMP_END,
-    THROTTLE_GAIN,
     Parameters,
     in_newer_names,
     in_older_names,
     low_pass_gain,
     parameters_from,
 )
+from app.autopilots.ardupilot.replica.vertical import ACCELERATION_IMAX, HOVER, RAMP_END, THROTTLE_GAIN, packed
 from app.core.errors import InputError
 
 
@@ -77,22 +74,22 @@ def test_filters_limit_the_jerk_of_the_trajectory(
 def test_gain_of_a_low_pass() -> None:
     assert low_pass_gain(0.0, 0.0025) == 1.0
     assert low_pass_gain(20.0, 0.0025) == pytest.approx(0.0025 / (0.0025 + 0.0079577472))
-    assert Parameters().packed(0.005)[THROTTLE_GAIN] == pytest.approx(0.005 / (0.005 + 0.0795774715))
+    assert packed(Parameters(), 0.005)[THROTTLE_GAIN] == pytest.approx(0.005 / (0.005 + 0.0795774715))
 
 
 @pytest.mark.parametrize(("hover", "used"), [(0.05, 0.125), (0.39, 0.39), (0.9, 0.6875)])
 def test_hover_throttle_is_limited_as_in_the_firmware(hover: float, used: float) -> None:
-    assert Parameters(hover_throttle=hover).packed()[HOVER] == used
+    assert packed(Parameters(hover_throttle=hover))[HOVER] == used
 
 
 def test_the_integrator_may_always_remove_the_hover_throttle() -> None:
-    limits = [Parameters(acceleration_imax_per_mille=imax).packed()[ACCELERATION_IMAX] for imax in (0.0, 800.0)]
+    limits = [packed(Parameters(acceleration_imax_per_mille=imax))[ACCELERATION_IMAX] for imax in (0.0, 800.0)]
     assert limits == pytest.approx([350.0, 800.0])
 
 
 @pytest.mark.parametrize(("most", "end"), [(0.5, 0.5), (0.95, 0.9)])
 def test_the_ramp_ends_at_ninety_percent_at_the_latest(most: float, end: float) -> None:
-    assert Parameters(takeoff_throttle=most).packed()[RAMP_END] == end
+    assert packed(Parameters(takeoff_throttle=most))[RAMP_END] == end
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from app.autopilots.ardupilot.replica.vertical import (
     V_D,
     VELOCITY_ERROR,
     Z_D,
+    packed,
     shape,
 )
 
@@ -37,7 +38,7 @@ def advanced(
     state = np.zeros(STATE_SIZE)
     state[[Z_D, V_D, A_D]] = motion
     state[[SATURATED, POSITION_ERROR, VELOCITY_ERROR]] = saturated, position_error, velocity_error
-    shape(state, limits.packed(DT), target)
+    shape(state, packed(limits, DT), target)
     return float(state[Z_D]), float(state[V_D]), float(state[A_D])
 
 

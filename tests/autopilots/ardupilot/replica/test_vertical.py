@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.ardupilot.replica.parameters import POSITION_P, STEP_S, Packed, Parameters
+from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
 from app.autopilots.ardupilot.replica.vertical import (
     A_T,
@@ -15,6 +15,7 @@ from app.autopilots.ardupilot.replica.vertical import (
     FLIGHT,
     OUTPUTS,
     PHASE,
+    POSITION_P,
     RAMP,
     SPOOL,
     STATE_SIZE,
@@ -24,6 +25,7 @@ from app.autopilots.ardupilot.replica.vertical import (
     V_T,
     VELOCITY_SUM,
     Z_D,
+    Packed,
     State,
     control,
     enter_position_mode,
@@ -32,6 +34,9 @@ from app.autopilots.ardupilot.replica.vertical import (
     start_hover,
     start_takeoff,
     take_off,
+)
+from app.autopilots.ardupilot.replica.vertical import (
+    packed as constants_of,
 )
 from app.autopilots.ardupilot.trace import read_ardupilot_trace
 
@@ -59,13 +64,13 @@ def largest_differences(trace: LoopTrace) -> np.ndarray[tuple[int], np.dtype[np.
 
 def hovering(parameters: Parameters, *, throttle: float = 0.35, a: float = 0.0) -> tuple[State, Packed]:
     """A loop that was entered at rest at 5 m."""
-    state, packed = np.empty(STATE_SIZE), parameters.packed()
+    state, packed = np.empty(STATE_SIZE), constants_of(parameters)
     start_hover(state, packed, throttle, 5.0, 0.0, a)
     return state, packed
 
 
 def on_the_ground(parameters: Parameters, spool_s: float = 0.0) -> tuple[State, Packed]:
-    state, packed = np.empty(STATE_SIZE), parameters.packed()
+    state, packed = np.empty(STATE_SIZE), constants_of(parameters)
     start_takeoff(state, packed, spool_s)
     return state, packed
 
@@ -99,7 +104,7 @@ def test_the_replica_runs_beside_the_whole_recording(path: Path) -> None:
 
 def largest_differences_beside(trace: LoopTrace, *, follow: bool) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Of the loop itself, which continues from every recorded row, or from none."""
-    state, packed = np.empty(STATE_SIZE, dtype=np.float32), trace.parameters.packed(trace.dt_s)
+    state, packed = np.empty(STATE_SIZE, dtype=np.float32), constants_of(trace.parameters, trace.dt_s)
     if trace.hover is None:
         start_takeoff(state, packed, 0.0)
     else:

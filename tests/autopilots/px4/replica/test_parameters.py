@@ -2,13 +2,8 @@ import math
 
 import pytest
 
-from app.autopilots.px4.replica.parameters import (
-    DERIVATIVE_GAIN,
-    VELOCITY_GAIN,
-    Parameters,
-    low_pass_gain,
-    parameters_from,
-)
+from app.autopilots.px4.replica.parameters import Parameters, low_pass_gain, parameters_from
+from app.autopilots.px4.replica.vertical import DERIVATIVE_GAIN, VELOCITY_GAIN, packed
 from app.core.errors import InputError
 
 
@@ -24,9 +19,9 @@ def test_gain_of_a_low_pass() -> None:
     """T/(T + 1/(2πf)): 0.008/(0.008 + 0.0318310)."""
     assert low_pass_gain(0.0, 0.008) == 1.0
     assert low_pass_gain(5.0, 0.008) == pytest.approx(0.008 / 0.039830989, rel=1e-6)
-    packed = Parameters().packed()
-    assert packed[VELOCITY_GAIN] == 1.0
-    assert packed[DERIVATIVE_GAIN] == pytest.approx(0.008 / 0.039830989, rel=1e-6)
+    constants = packed(Parameters())
+    assert constants[VELOCITY_GAIN] == 1.0
+    assert constants[DERIVATIVE_GAIN] == pytest.approx(0.008 / 0.039830989, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.px4.replica.parameters import Packed, Parameters
+from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.replay import LoopTrace, replayed
 from app.autopilots.px4.replica.vertical import (
     ACCELERATION_TARGET,
@@ -27,10 +27,14 @@ from app.autopilots.px4.replica.vertical import (
     THRUST,
     VELOCITY,
     VELOCITY_TARGET,
+    Packed,
     State,
     rollout,
     start,
     start_hover,
+)
+from app.autopilots.px4.replica.vertical import (
+    packed as constants_of,
 )
 from app.autopilots.px4.trace import read_px4_trace
 from app.core.records.trajectory import Samples
@@ -68,13 +72,13 @@ def differences(trace: LoopTrace, computed: Samples) -> Samples:
 
 def flying(parameters: Parameters, *, thrust: float = 0.5, vz: float = 0.0) -> tuple[State, Packed]:
     """A loop in hover with a hover thrust of 0.5."""
-    state, packed = np.empty(STATE_SIZE, dtype=np.float32), parameters.packed()
+    state, packed = np.empty(STATE_SIZE, dtype=np.float32), constants_of(parameters)
     start_hover(state, packed, 0.5, thrust, vz)
     return state, packed
 
 
 def disarmed(parameters: Parameters) -> tuple[State, Packed]:
-    state, packed = np.empty(STATE_SIZE, dtype=np.float32), parameters.packed()
+    state, packed = np.empty(STATE_SIZE, dtype=np.float32), constants_of(parameters)
     start(state, packed)
     return state, packed
 
