@@ -12,8 +12,7 @@ from app.autopilots.experiments import EXPERIMENTS
 from app.autopilots.registry import AUTOPILOTS
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
-from app.common.schemas import Schema
-from app.core.definition import Option
+from app.common.schemas import OptionValue, Schema
 from app.core.policy import Gain
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
@@ -39,6 +38,21 @@ class Health(Schema):
     vehicles_not_answering: list[VehicleTrouble]
 
 
+class OptionInfo(Schema):
+    """A setting of an experiment, a strategy or a vehicle: one of `choices`, or any value of the default's type within
+    `lower` … `upper` where `choices` is empty."""
+
+    name: str
+    title: str
+    label: str = Field(default="", description="the title without the help for entering a value; empty if it has none")
+    unit: str = ""
+    default: OptionValue
+    choices: list[OptionValue] = Field(default=[])
+    lower: float | None = None
+    upper: float | None = None
+    autopilots: list[str] = Field(default=[], description="the autopilots that have this option; empty: all")
+
+
 class ExperimentInfo(Schema):
     """An experiment. `output` is the channel that is scored. Without a model there are no predictions, and gains are
     chosen by hand."""
@@ -50,7 +64,7 @@ class ExperimentInfo(Schema):
     error_unit: str
     has_model: bool
     gains: list[Gain]
-    options: list[Option]
+    options: list[OptionInfo]
 
 
 class StrategyInfo(Schema):
@@ -59,7 +73,7 @@ class StrategyInfo(Schema):
     name: str
     title: str
     line: str
-    options: list[Option]
+    options: list[OptionInfo]
     experiments: list[str]
 
 
@@ -74,7 +88,7 @@ class VehicleKindInfo(Schema):
     can_fly: bool
     registered: bool
     experiments: list[str]
-    options: list[Option]
+    options: list[OptionInfo]
     highest_set_point_m: float | None = Field(description="highest altitude that it is commanded to fly to; null: any")
 
 

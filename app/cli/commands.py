@@ -149,7 +149,7 @@ def sim_drone(
     autopilot: Annotated[
         str | None,
         typer.Option(
-            show_default="paparazzi",
+            show_default="the first of these",
             help="Autopilot to simulate: paparazzi, paparazzi-bare, paparazzi-5.10, ardupilot, ardupilot-4.7 or px4.",
         ),
     ] = None,

@@ -15,7 +15,7 @@ from app.cli.commands import app
         ("report", "[default: (campaign-ID-report.html)]"),
         ("report", "[default: (from the extension of FILE, else html)]"),
         ("bundle", "[default: (campaign-ID.gainline.zip)]"),
-        ("sim-drone", "[default: (paparazzi)]"),
+        ("sim-drone", "[default: (the first of these)]"),
         ("sim-drone", "udp:HOST:PORT[@LOCALPORT]."),
         ("sim-drone", "[default: (udp:127.0.0.1:4244@4245 for Paparazzi, else udp:127.0.0.1:14550)]"),
     ],

@@ -24,7 +24,7 @@ export type {
   NewTrial,
   NewVehicle,
   NextFlight,
-  Option as OptionInfo,
+  OptionInfo,
   PresetInfo,
   Proposal,
   RepeatGroup,

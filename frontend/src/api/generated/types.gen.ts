@@ -1341,7 +1341,7 @@ export type ExperimentInfo = {
     /**
      * Options
      */
-    options: Array<Option>;
+    options: Array<OptionInfo>;
 };
 
 /**
@@ -2734,13 +2734,12 @@ export type NextFlight = {
 };
 
 /**
- * Option
+ * OptionInfo
  *
- * One setting: one of `choices`, or any number of the default's type within `lower` … `upper`. `label`: the title
- * without the help for entering a value, empty if it contains none. `autopilots`: those whose vehicles have it, empty
- * for all.
+ * A setting of an experiment, a strategy or a vehicle: one of `choices`, or any value of the default's type within
+ * `lower` … `upper` where `choices` is empty.
  */
-export type Option = {
+export type OptionInfo = {
     /**
      * Name
      */
@@ -2750,33 +2749,37 @@ export type Option = {
      */
     title: string;
     /**
+     * Label
+     *
+     * the title without the help for entering a value; empty if it has none
+     */
+    label: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
      * Default
      */
     default: boolean | number | number | string;
     /**
-     * Unit
+     * Choices
      */
-    unit?: string;
+    choices: Array<boolean | number | number | string>;
     /**
      * Lower
      */
-    lower?: number | null;
+    lower: number | null;
     /**
      * Upper
      */
-    upper?: number | null;
-    /**
-     * Choices
-     */
-    choices?: Array<boolean | number | number | string>;
-    /**
-     * Label
-     */
-    label?: string;
+    upper: number | null;
     /**
      * Autopilots
+     *
+     * the autopilots that have this option; empty: all
      */
-    autopilots?: Array<string>;
+    autopilots: Array<string>;
 };
 
 /**
@@ -3673,7 +3676,7 @@ export type StrategyInfo = {
     /**
      * Options
      */
-    options: Array<Option>;
+    options: Array<OptionInfo>;
     /**
      * Experiments
      */
@@ -4578,7 +4581,7 @@ export type VehicleKindInfo = {
     /**
      * Options
      */
-    options: Array<Option>;
+    options: Array<OptionInfo>;
     /**
      * Highest Set Point M
      *
