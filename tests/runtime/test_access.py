@@ -27,7 +27,7 @@ REAL = {
 LAN = "192.168.178.20"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")  # as the server is: another module's tests may come between these
 def bee(serving: Serving) -> int:
     """A real vehicle of the operator, who has opened the link that the terminal printed."""
     serving.unlock()
