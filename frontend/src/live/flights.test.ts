@@ -15,8 +15,14 @@ test("a flight that ends without an abort, at a limit or because its link is los
   const stages = ["record", "abort-land", "link lost"].map((step) => abortStage(7, none, step));
   expect(stages).toEqual(["none", "landing", "link lost"]);
   expect(stages.map((stage) => ABORT_LABELS[stage])).toEqual(["ABORT", "LANDING", "LINK LOST"]);
-  expect(stages.map(isCutShort)).toEqual([false, true, true]);
   expect(abortStage(7, { ...none, asked: new Set([7]) }, "abort-land")).toBe("sending");
+});
+
+test("a flight is cut short by an abort that is accepted, or once the vehicle shows it, whichever is known first", () => {
+  expect(
+    (["none", "sending", "not confirmed", "accepted"] as const).map((stage) => isCutShort(stage, "record")),
+  ).toEqual([false, false, false, true]);
+  for (const step of ["abort-land", "link lost"]) expect(isCutShort("sending", step)).toBe(true);
 });
 
 test("after a link loss nobody is told that safe gains are being sent, and one way on is named", () => {

@@ -9,6 +9,7 @@ import { problemOf } from "../api/problems";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { liveFlightsNow } from "./store";
+import { isAbortStep } from "./vehicleStatus";
 
 export interface FlyingCampaign {
   campaignId: number;
@@ -134,9 +135,10 @@ export type AbortStage = "none" | "sending" | "not confirmed" | "accepted" | "la
 
 const UNASKED: Readonly<Record<string, AbortStage>> = { "abort-land": "landing", "link lost": "link lost" };
 
-/** Whether the flight ends before its record is complete. */
-export function isCutShort(stage: AbortStage): boolean {
-  return stage === "accepted" || stage === "landing" || stage === "link lost";
+/** Whether the flight ends before its record is complete: an abort is accepted, or the vehicle's `step` shows it, which
+ * may be known before the answer to the abort. */
+export function isCutShort(stage: AbortStage, step?: string): boolean {
+  return stage === "accepted" || isAbortStep(step);
 }
 
 /** `step` is the vehicle's. */

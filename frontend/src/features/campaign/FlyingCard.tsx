@@ -31,6 +31,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const { registered } = campaign.vehicle;
   const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
   const aborting = abortStage(step.trialId, abort, status?.status.step);
+  const isUnscored = isCutShort(aborting, status?.status.step);
   const stage = flyingStage(trial, live);
   const isAfter = isAfterRecord(status?.status.step);
   const hasOutput = isAfter || (live !== null && live.timeS.length > 0);
@@ -47,8 +48,8 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             <dd>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</dd>
           </div>
           <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>{isCutShort(aborting) ? "Error" : "Error so far"}</dt>
-            <dd>{isCutShort(aborting) ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
+            <dt>{isUnscored ? "Error" : "Error so far"}</dt>
+            <dd>{isUnscored ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Predicted error</dt>

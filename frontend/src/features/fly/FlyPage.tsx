@@ -86,7 +86,8 @@ function Screen({ campaign, trial, vehicle }: Props) {
     isStopped: orders.said?.order === "motors off" && orders.said.accepted,
   });
   const isFlying = step === "flying";
-  const isAborting = isCutShort(abortStage(trial.id, abort, status?.status.step));
+  const vehicleStep = status?.status.step;
+  const isAborting = isCutShort(abortStage(trial.id, abort, vehicleStep), vehicleStep);
   const isAborted = useLatched(flightId, isFlying && isAborting);
   const isLanded = isFlying && isDown(status, (live?.timeS.length ?? 0) > 0);
   const watching = useReadOnlyReason(vehicle);
