@@ -17,7 +17,7 @@ from rich.table import Table
 from app.autopilots.loop_check import Result as CheckResult
 from app.autopilots.loop_checks import CHECKS, autopilot_of, examine_file
 from app.autopilots.paparazzi.log import read_paparazzi
-from app.autopilots.paparazzi.loop_check import LogCheck, check_log, parse_gains
+from app.autopilots.paparazzi.loop_check import TOLERANCE_UNITS, LogCheck, check_log, parse_gains
 from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.autopilots.paparazzi.replica.simulation import TIME_TOLERANCE_S, TOLERANCES
 from app.cli.console import console, show_error, table, write_json
@@ -86,9 +86,6 @@ def _document(result: Result) -> dict[str, object]:
         for row in result.rows
     ]
     return {**result.as_json(), "rows": rows}
-
-
-_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 
 
 def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
@@ -224,7 +221,7 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
         rows += [
             (
                 f"{name} beyond ±{1000 * TIME_TOLERANCE_S:g} ms",
-                f"{value:.4f} (allowed {TOLERANCES[name]:g}) {_UNITS[name]}",
+                f"{value:.4f} (allowed {TOLERANCES[name]:g}) {TOLERANCE_UNITS[name]}",
             )
             for name, value in simulation.largest_difference.items()
         ]

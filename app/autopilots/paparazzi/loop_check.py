@@ -52,7 +52,7 @@ _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
         "thrust": _in_counts("Commanded thrust", "of 9600", 0),
     }
 )
-_TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
+TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 _BEYOND: Final = f"beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty"
 _STEP_APART: Final = "compared bit for bit; fields may be one step of 1/512 s apart"
 _COUNTED: Final = f"only differences beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty count"
@@ -165,7 +165,7 @@ def _result_of_log(checked: LogCheck) -> Result:
     ]
     if simulation is not None:
         judged = {
-            name: replace(_SIGNALS[name], tolerance=allowed, allowance=_COUNTED, difference_unit=_TOLERANCE_UNITS[name])
+            name: replace(_SIGNALS[name], tolerance=allowed, allowance=_COUNTED, difference_unit=TOLERANCE_UNITS[name])
             for name, allowed in TOLERANCES.items()
         }
         signals[:0] = [
@@ -199,7 +199,7 @@ def _log_sentence(checked: LogCheck) -> str:
     if simulation is not None and not simulation.passed:
         name, value = max(simulation.largest_difference.items(), key=lambda pair: pair[1] / TOLERANCES[pair[0]])
         return (
-            f"The replica differs: {name} is {value:.3g} {_TOLERANCE_UNITS[name]} {_BEYOND}; {TOLERANCES[name]:g} is "
+            f"The replica differs: {name} is {value:.3g} {TOLERANCE_UNITS[name]} {_BEYOND}; {TOLERANCES[name]:g} is "
             "allowed."
         )
     apart = sum(commands.stale.values())
