@@ -2,17 +2,22 @@
 
 The library's connection layer (mavutil) is not used: it changes the protocol version of the whole process when one
 frame of MAVLink 2 arrives.
+
+MAVLink 2 can be signed: frames contain a keyed hash, and frames without a valid one count as bad data. Both ends have
+the same key of 32 bytes. MAVLink 1, and so Paparazzi, has no signing.
 """
 
+import datetime as dt
 import importlib
 import struct
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, Final, Protocol
 
-from app.autopilots import signing
 from app.core.errors import InputError, Problem
 
 FieldValue = float | int | str | bytes | Sequence[float]
@@ -24,6 +29,9 @@ UNKNOWN: Final = "UNKNOWN_"
 NO_AUTOPILOT: Final = 8
 _MAVLINK_1: Final = 0xFE
 _SPENT_BYTES: Final = 4096
+_KEY_BYTES: Final = 32
+_EPOCH_NS: Final = int(dt.datetime(2015, 1, 1, tzinfo=dt.UTC).timestamp()) * 10**9
+_TICK_NS: Final = 10_000
 
 
 class Message(Protocol):
@@ -123,8 +131,42 @@ class Dialect:
         return message
 
     def codec(self, *, system: int, component: int, signing_key: bytes | None = None) -> "Codec":
-        """Return a codec of this dialect. Raises InputError for a signing key with MAVLink 1."""
+        """Return a codec of this dialect. Raises InputError for a signing key with MAVLink 1, or of a wrong length."""
         return Codec(self, system=system, component=component, signing_key=signing_key)
+
+
+def read_key(file: Path) -> bytes:
+    """Read a signing key of 64 hexadecimal digits. Raises InputError, which does not contain the text: it is secret."""
+    try:
+        text = file.expanduser().read_text(encoding="ascii")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            "The signing key cannot be read.",
+            problems=(Problem("signing_key_file", f"names a file that cannot be read ({type(error).__name__})"),),
+            hint=f"Name a file with {2 * _KEY_BYTES} hexadecimal digits that this user can read.",
+        ) from error
+    try:
+        key = bytes.fromhex(text.strip())
+    except ValueError:
+        key = b""
+    _check_key(key)
+    return key
+
+
+def _check_key(key: bytes) -> None:
+    if len(key) != _KEY_BYTES:
+        raise InputError(
+            "This is not a signing key.",
+            problems=(
+                Problem("signing_key", f"must be {_KEY_BYTES} bytes, written as {2 * _KEY_BYTES} hexadecimal digits"),
+            ),
+            hint="Create one with: openssl rand -hex 32",
+        )
+
+
+def signing_time() -> int:
+    """Return the time in units of 10 µs since 2015, as in signatures."""
+    return (time.time_ns() - _EPOCH_NS) // _TICK_NS
 
 
 class Codec:
@@ -146,14 +188,19 @@ class Codec:
         self._in.robust_parsing = True
         self._signs = signing_key is not None
         if signing_key is not None:
-            signing.enable(self._out.signing, signing_key)
-            signing.enable(self._in.signing, signing_key)
+            _check_key(signing_key)
+            for state in (self._out.signing, self._in.signing):  # both sign, and accept only what is signed
+                state.secret_key = signing_key
+                state.sign_outgoing = True
+                state.timestamp = signing_time()
 
     def pack(self, message: Message) -> bytes:
         """Return the frame of `message` (of `Dialect.message`), with the next sequence number, signed if there is a
-        key."""
+        key: with the time, or the latest one seen from the other end if that is ahead, for times must not go back or
+        repeat."""
         if self._signs:
-            signing.refresh(self._out.signing, seen=self._in.signing.timestamp)
+            out = self._out.signing
+            out.timestamp = max(out.timestamp, self._in.signing.timestamp, signing_time())
         packable: _Packable = message  # type: ignore[assignment]  # every message of the library has `pack`
         frame = packable.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256

@@ -76,13 +76,12 @@ def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
     found: list[Takeoff] = []
     free_from_s = -np.inf
     for stood, down in _flights(log, time_s, altitude_m):
-        begin, is_commanded = _beginning(log, float(time_s[stood]), free_from_s)
+        begin = _beginning(log, float(time_s[stood]), free_from_s)
         held = _GainsAt(log, begin.time_s)
         kept, end = _kept(log, time_s, begin, held, stood, down)
         if kept.stop - kept.start >= MIN_SAMPLES:
             ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
-            record = _Record(log, begin, end, is_commanded, ground_m, held)
-            found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
+            found.append(_takeoff(log, len(found) + 1, time_s, channels, kept, begin, end, ground_m, held))
         free_from_s = float(time_s[down])
         if len(found) > MAX_TAKEOFFS:
             raise TrajectoryError(
@@ -200,8 +199,8 @@ def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int
     return len(time_s)
 
 
-def _beginning(log: Recording, stood_s: float, free_from_s: float) -> tuple[Event, bool]:
-    """The event from which time counts, and whether it is a command: the first one, since later ones repeat it."""
+def _beginning(log: Recording, stood_s: float, free_from_s: float) -> Event:
+    """The event from which time counts: the first command, since later ones repeat it, or else the lift-off."""
     ahead_s = max(free_from_s, stood_s - _COMMAND_AHEAD_S)
     commands = [start for start in log.events_of(EventKind.TAKEOFF) if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
     blocks = [
@@ -209,8 +208,8 @@ def _beginning(log: Recording, stood_s: float, free_from_s: float) -> tuple[Even
         for each in log.blocks
         if ahead_s < each.begin_s <= stood_s < each.end_s
     ]
-    begin = min(commands or blocks, key=lambda start: start.time_s, default=None)
-    return (Event(EventKind.LIFT_OFF, stood_s, "lift-off"), False) if begin is None else (begin, True)
+    lift_off = Event(EventKind.LIFT_OFF, stood_s, "lift-off")
+    return min(commands or blocks, key=lambda start: start.time_s, default=lift_off)
 
 
 def _kept(
@@ -250,10 +249,7 @@ class _GainsAt:
         logged = next((gains for gains in sets if known.issuperset(gain.parameter for gain in gains)), ())
         names = [gain.parameter for gain in logged]
         settings = sorted((each for each in log.settings if each.name in names), key=lambda each: each.time_s)
-        gains: dict[str, float] = {}
-        for each in settings:
-            if each.time_s <= at_s:
-                gains[each.name] = each.value
+        gains = {each.name: each.value for each in settings if each.time_s <= at_s}
         self.learned_late = sorted(set(names) - set(gains))
         for each in settings:
             gains.setdefault(each.name, each.value)
@@ -270,46 +266,50 @@ class _GainsAt:
         ]
 
 
-@dataclass(frozen=True, slots=True)
-class _Record:
-    """Data from which one takeoff is assembled."""
+def _takeoff(
+    log: Recording,
+    number: int,
+    time_s: Samples,
+    channels: Mapping[str, Samples],
+    kept: slice,
+    begin: Event,
+    end: Event,
+    ground_m: float,
+    held: _GainsAt,
+) -> Takeoff:
+    """The takeoff with this part of the samples as its record."""
+    shift_m = ground_m if log.autopilot.climbs_from_ground else 0.0
+    cut = {name: values[kept] - (shift_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
+    complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
+    left_out = [name for name in cut if name not in complete]
+    notes = (*log.notes, *log.remarks, *_notes(log, begin, end, ground_m, held, left_out))
+    return Takeoff(
+        number=number,
+        start_s=begin.time_s - float(time_s[0]),
+        begins_with=begin.what,
+        trajectory=Trajectory(
+            time_s[kept] - begin.time_s,
+            complete,
+            source="; ".join((log.title, f"time from {begin.what}", *notes)),
+            clock=log.clock,
+        ),
+        gains=held.gains,
+        gain_names=tuple(gain.gain for gain in log.autopilot.gain_sets[0]),
+        notes=notes,
+        is_commanded=begin.kind is EventKind.TAKEOFF,
+    )
 
-    log: Recording
-    begin: Event
-    end: Event
-    is_commanded: bool
-    ground_m: float
-    held: _GainsAt
 
-    def takeoff(self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: slice) -> Takeoff:
-        ground_m = self.ground_m if self.log.autopilot.climbs_from_ground else 0.0
-        cut = {name: values[kept] - (ground_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
-        complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
-        notes = (*self.log.notes, *self.log.remarks, *self._notes([name for name in cut if name not in complete]))
-        return Takeoff(
-            number=number,
-            start_s=self.begin.time_s - float(time_s[0]),
-            begins_with=self.begin.what,
-            trajectory=Trajectory(
-                time_s[kept] - self.begin.time_s,
-                complete,
-                source="; ".join((self.log.title, f"time from {self.begin.what}", *notes)),
-                clock=self.log.clock,
-            ),
-            gains=self.held.gains,
-            gain_names=tuple(gain.gain for gain in self.log.autopilot.gain_sets[0]),
-            notes=notes,
-            is_commanded=self.is_commanded,
-        )
-
-    def _notes(self, left_out: Sequence[str]) -> Iterator[str]:
-        if not self.is_commanded:
-            yield NOT_COMMANDED
-        if self.log.autopilot.climbs_from_ground:
-            yield f"altitude relative to the ground, which is at {self.ground_m:.2f} m in the log"
-        if self.held.learned_late:
-            yield f"known only after the takeoff: {', '.join(self.held.learned_late)}"
-        if left_out:
-            yield f"left out because of missing values: {', '.join(left_out)}"
-        if self.end.what:
-            yield f"ends after {self.end.time_s - self.begin.time_s:.1f} s with {self.end.what}"
+def _notes(
+    log: Recording, begin: Event, end: Event, ground_m: float, held: _GainsAt, left_out: Sequence[str]
+) -> Iterator[str]:
+    if begin.kind is not EventKind.TAKEOFF:
+        yield NOT_COMMANDED
+    if log.autopilot.climbs_from_ground:
+        yield f"altitude relative to the ground, which is at {ground_m:.2f} m in the log"
+    if held.learned_late:
+        yield f"known only after the takeoff: {', '.join(held.learned_late)}"
+    if left_out:
+        yield f"left out because of missing values: {', '.join(left_out)}"
+    if end.what:
+        yield f"ends after {end.time_s - begin.time_s:.1f} s with {end.what}"

@@ -8,7 +8,7 @@ the one in which it lifted off; NAV_TAKEOFF, the takeoff mode); parameters are t
 
 import struct
 from array import array
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.autopilot import Autopilot
 from app.autopilots.gains import GainParameter
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
@@ -29,11 +30,15 @@ from app.autopilots.recording import (
     restarts,
     spans_of,
 )
-from app.autopilots.tlog_vehicle import LoggedVehicle, find_vehicle
+from app.autopilots.registry import AUTOPILOTS
 from app.core.records.trajectory import THROTTLE_HOLDS_S
-from app.logs.base import Table, contents
-from app.logs.tlog import Message, messages
+from app.logs.base import Contents, Table, contents, refused
+from app.logs.tlog import Message, frames, messages
 
+HINT: Final = (
+    "Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
+    "contain the ground station's commands."
+)
 SOURCES: Final[Mapping[str, Source]] = {
     "altitude_m": Source("LOCAL_POSITION_NED", "z", -1.0),
     "climb_rate_m_s": Source("LOCAL_POSITION_NED", "vz", -1.0),
@@ -70,16 +75,53 @@ _IGNORES_Z: Final = 4
 _IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
 _IGNORES_ATTITUDE: Final = 128
 _INTEGERS: Final = range(1, 9)
+_AUTOPILOTS: Final = {each.autopilot: each for each in AUTOPILOTS.values()}
+"""By the autopilot number in the heartbeat."""
+_LOCAL_POSITION_NED: Final = 32
+_COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
+"""Kinds of vehicles with several rotors, in a heartbeat."""
+_OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
+    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
+)
 
 
 def read_tlog(stream: BinaryIO) -> Recording:
     """Decode the messages of the vehicle that reports its position most often. Raises TrajectoryError if there is no
     heartbeat of a known autopilot."""
     data = contents(stream)
-    decoder = _Decoder(find_vehicle(data))
-    for message in messages(data, decoder.vehicle.autopilot.dialect.library, {*decoder.reports, *decoder.requests}):
+    decoder = _Decoder(_find_vehicle(data))
+    for message in messages(data, decoder.vehicle.autopilot.dialect.library, {*_REPORTS, *_REQUESTS}):
         decoder.take(message)
     return decoder.recording()
+
+
+@dataclass(frozen=True, slots=True)
+class _Vehicle:
+    """A vehicle in a log: its system and component, its autopilot, and the number of its kind."""
+
+    system: int
+    component: int
+    autopilot: Autopilot
+    kind: int
+
+
+def _find_vehicle(data: Contents) -> _Vehicle:
+    """The vehicle that reports its position most often. Raises TrajectoryError if there is no heartbeat of a known
+    autopilot."""
+    from pymavlink.dialects.v20 import minimal
+
+    found: dict[tuple[int, int], _Vehicle] = {}
+    for message in messages(data, minimal, {"HEARTBEAT"}):
+        place, autopilot = (message.system, message.component), _AUTOPILOTS.get(int(message["autopilot"]))
+        if autopilot is not None and place not in found:
+            found[place] = _Vehicle(*place, autopilot, int(message["type"]))
+    if not found:
+        known = ", ".join(autopilot.project or autopilot.title for autopilot in _AUTOPILOTS.values())
+        raise refused(f"contains no MAVLink heartbeat of {known}", HINT)
+    positions = Counter(
+        (frame.system, frame.component) for frame in frames(data) if frame.message == _LOCAL_POSITION_NED
+    )
+    return max(found.values(), key=lambda each: positions[each.system, each.component])
 
 
 @dataclass(slots=True)
@@ -106,9 +148,7 @@ class _Clock:
 class _Decoder:
     """Messages of ground stations and the vehicle, in order of receipt."""
 
-    vehicle: LoggedVehicle
-    reports: Mapping[str, Callable[[Message], None]] = field(init=False)
-    requests: Mapping[str, Callable[[Message], None]] = field(init=False)
+    vehicle: _Vehicle
     _gains: Mapping[str, GainParameter] = field(init=False)
     _clock: _Clock = field(default_factory=_Clock)
     _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(lambda: array("d")))
@@ -130,52 +170,31 @@ class _Decoder:
 
     def __post_init__(self) -> None:
         self._gains = {gain.parameter: gain for gains in self.vehicle.autopilot.gain_sets for gain in gains}
-        self.reports = {
-            "HEARTBEAT": self._heartbeat,
-            "LOCAL_POSITION_NED": self._as_it_is,
-            "ATTITUDE_TARGET": self._attitude_target,
-            "POSITION_TARGET_LOCAL_NED": self._position_target,
-            "NAV_CONTROLLER_OUTPUT": self._as_it_is,
-            "SYS_STATUS": self._battery,
-            "VFR_HUD": self._throttle,
-            "PARAM_VALUE": self._parameter,
-            "COMMAND_ACK": self._answer,
-            "SCRIPT_ITEM": self._block,
-            "SCRIPT_CURRENT": self._block_entered,
-        }
-        self.requests = {
-            "PARAM_SET": self._parameter_asked,
-            "SET_POSITION_TARGET_LOCAL_NED": self._position_asked,
-            "SET_MODE": self._mode_asked,
-            "COMMAND_INT": self._command,
-            "COMMAND_LONG": self._command,
-            "SCRIPT_ITEM": self._block_asked,
-        }
 
     def take(self, message: Message) -> None:
-        handlers: Mapping[str, Callable[[Message], None]] = {}
+        handlers: _Handlers = {}
         if (message.system, message.component) == (self.vehicle.system, self.vehicle.component):
-            handlers = self.reports
+            handlers = _REPORTS
         elif message.system != self.vehicle.system or message.name in _FROM_ANY:
-            handlers = self.requests
+            handlers = _REQUESTS
         if message.name in handlers:
-            handlers[message.name](message)
+            handlers[message.name](self, message)
 
     def recording(self) -> Recording:
         """What was read so far."""
-        autopilot = self.vehicle.autopilot
+        autopilot, kind = self.vehicle.autopilot, self.vehicle.kind
         self._events.extend(self._sent.values())  # a command without an answer counts as accepted
         for time_s, number in self._activated:
             name = self._blocks.get(number, "")
             takes_off = "takeoff" in name.casefold().replace(" ", "").replace("_", "")
-            kind = EventKind.TAKEOFF if takes_off else EventKind.COMMAND
-            self._events.append(Event(kind, time_s, f"the block {name}" if name else f"block {number}"))
+            what = f"the block {name}" if name else f"block {number}"
+            self._events.append(Event(EventKind.TAKEOFF if takes_off else EventKind.COMMAND, time_s, what))
         tables = {name: _table(name, values) for name, values in self._reports.items()}
         return Recording(
             title=f"MAVLink log of {autopilot.project or autopilot.title}",
             autopilot=autopilot,
             system=self.vehicle.system,
-            frame=self.vehicle.other_frame,
+            frame="" if kind in _COPTERS else _OTHER_KINDS.get(kind, f"a vehicle of MAVLink's type {kind}"),
             columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
             sources=list(tables),
             settings=self._settings,
@@ -307,3 +326,28 @@ class _Decoder:
 def _table(message: str, reports: "array[float]") -> Table:
     names = (_TIME, *_FIELDS[message])
     return dict(zip(names, np.array(reports).reshape(-1, len(names)).T, strict=True))
+
+
+_Handlers = Mapping[str, Callable[[_Decoder, Message], None]]
+
+_REPORTS: Final[_Handlers] = {
+    "HEARTBEAT": _Decoder._heartbeat,
+    "LOCAL_POSITION_NED": _Decoder._as_it_is,
+    "ATTITUDE_TARGET": _Decoder._attitude_target,
+    "POSITION_TARGET_LOCAL_NED": _Decoder._position_target,
+    "NAV_CONTROLLER_OUTPUT": _Decoder._as_it_is,
+    "SYS_STATUS": _Decoder._battery,
+    "VFR_HUD": _Decoder._throttle,
+    "PARAM_VALUE": _Decoder._parameter,
+    "COMMAND_ACK": _Decoder._answer,
+    "SCRIPT_ITEM": _Decoder._block,
+    "SCRIPT_CURRENT": _Decoder._block_entered,
+}
+_REQUESTS: Final[_Handlers] = {
+    "PARAM_SET": _Decoder._parameter_asked,
+    "SET_POSITION_TARGET_LOCAL_NED": _Decoder._position_asked,
+    "SET_MODE": _Decoder._mode_asked,
+    "COMMAND_INT": _Decoder._command,
+    "COMMAND_LONG": _Decoder._command,
+    "SCRIPT_ITEM": _Decoder._block_asked,
+}

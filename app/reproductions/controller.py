@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.paparazzi.trace import read_loop_trace
+from app.autopilots.paparazzi.loop_check import read_loop_trace
 from app.core.control.vertical_guidance import OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.figures.panels import Panel, Plot
 from app.reproductions.results import Progress, Result, Row, curve

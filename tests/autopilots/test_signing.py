@@ -1,9 +1,19 @@
 """Signed links: MAVLink 2 with a key that both ends hold."""
 
+from pathlib import Path
+
 import pytest
 
-from app.autopilots import signing
-from app.autopilots.dialects import ARDUPILOTMEGA, BAD_DATA, PAPARAZZI, Codec, FieldValue, number
+from app.autopilots.dialects import (
+    ARDUPILOTMEGA,
+    BAD_DATA,
+    PAPARAZZI,
+    Codec,
+    FieldValue,
+    number,
+    read_key,
+    signing_time,
+)
 from app.core.clock import ScaledClock
 from app.core.errors import InputError
 from app.vehicles.mavlink.link import Link
@@ -81,10 +91,10 @@ def test_time_stamps_keep_up_with_time() -> None:
     vehicle, _ = ends()
     stamps = []
     for _ in range(3):
-        before = signing.timestamp_now()
+        before = signing_time()
         frame = telemetry(vehicle, 20)
         stamps.append(int.from_bytes(frame[-12:-6], "little"))
-        assert before <= stamps[-1] <= signing.timestamp_now() + len(stamps)
+        assert before <= stamps[-1] <= signing_time() + len(stamps)
     assert stamps == sorted(set(stamps))
 
 
@@ -97,13 +107,17 @@ def test_paparazzi_cannot_be_signed() -> None:
     assert refusal.value.problems[0].reason == "needs MAVLink 2"
 
 
-def test_a_key_is_64_hexadecimal_digits() -> None:
-    assert signing.parse_key(KEY.hex() + "\n") == KEY
+def test_a_key_is_64_hexadecimal_digits(tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    file.write_text(KEY.hex() + "\n")
+    assert read_key(file) == KEY
 
 
 @pytest.mark.parametrize("text", ["", "secret", "00" * 31, "00" * 33, "zz" * 32])
-def test_what_is_no_key_is_refused_and_not_repeated(text: str) -> None:
+def test_what_is_no_key_is_refused_and_not_repeated(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "key"
+    file.write_text(text)
     with pytest.raises(InputError) as refusal:
-        signing.parse_key(text)
+        read_key(file)
     assert "64 hexadecimal digits" in refusal.value.problems[0].reason
     assert not text or text not in str(refusal.value)

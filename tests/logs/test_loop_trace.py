@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from app.autopilots.paparazzi.trace import COLUMNS, read_loop_trace
+from app.autopilots.paparazzi.loop_check import COLUMNS, read_loop_trace
 from app.core.errors import InputError
 
 HEADER = ",".join(COLUMNS)

@@ -1,10 +1,13 @@
 """Paparazzi's ground log to a `Recording`.
 
-A log is a .data file, and its .log companion, XML, with the airframe and the settings. VERT_LOOP contains the complete
-state of the vertical loop, in its own integers; without it the altitude comes from ROTORCRAFT_FP.
+A log is a .data file, and its .log companion, XML, with the airframe and the settings. The .data file has one message
+per line, with the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks.
+VERT_LOOP contains the complete state of the vertical loop, in its own integers; without it the altitude comes from
+ROTORCRAFT_FP.
 """
 
 import re
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise, product
@@ -13,14 +16,14 @@ from xml.parsers import expat
 
 import numpy as np
 
-from app.autopilots.paparazzi.ground_log import GroundLog, number_in, read_lines
 from app.autopilots.paparazzi.profile import PAPARAZZI
-from app.autopilots.paparazzi.replica.loop_log import GAINS, FlownGains, LoopLog, flown_gains
+from app.autopilots.paparazzi.replica.loop_log import FIELDS, GAINS, FlownGains, LoopLog, flown_gains
 from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
-from app.core.control.vertical_guidance import FULL_THRUST
+from app.core.control.vertical_guidance import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
 from app.logs.base import refused
+from app.logs.formats import head_of, is_ground_log
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20
 _GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
@@ -28,6 +31,10 @@ _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
 _SETTINGS: Final = 256
 _MOST_CANDIDATES: Final = 32
 _PLATEAU_S: Final = 2.0
+_MAX_SAMPLES: Final = 2_000_000
+_MAX_LINE_BYTES: Final = 4096
+_WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
+HINT: Final = "Use the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +53,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
 
     Raises TrajectoryError if either cannot be read.
     """
-    lines = read_lines(stream)
+    lines = _read_lines(stream)
     configuration = _Configuration(lines.aircraft)
     if companion is not None:
         configuration.read(companion, lines.values)
@@ -68,7 +75,60 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
     )
 
 
-def _columns(lines: GroundLog, loop: LoopLog | None) -> dict[str, Column]:
+@dataclass(slots=True)
+class _GroundLog:
+    """Messages of one aircraft: the first one that reports its altitude."""
+
+    aircraft: str = ""
+    others: set[str] = field(default_factory=set)
+    loop_time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    loop: "array[int]" = field(default_factory=lambda: array("q"))
+    time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    up: "array[int]" = field(default_factory=lambda: array("q"))
+    up_speed: "array[int]" = field(default_factory=lambda: array("q"))
+    values: list[tuple[float, int, float]] = field(default_factory=list)
+
+    def loop_log(self) -> LoopLog:
+        """The samples whose time increases."""
+        time_s, values = np.array(self.loop_time_s), np.array(self.loop, dtype=np.int64).reshape(-1, len(FIELDS))
+        return LoopLog(time_s, values).part(increasing(time_s))
+
+
+def _read_lines(stream: BinaryIO) -> _GroundLog:
+    """Parse the stream; lines other than these messages are skipped."""
+    lines = _GroundLog()
+    if not is_ground_log(head_of(stream)):
+        raise refused("does not start with a line of time, aircraft and message", HINT)
+    while line := stream.readline(_MAX_LINE_BYTES):
+        fields = line.split(maxsplit=3)
+        if len(fields) == 4 and fields[2] in _WANTED:
+            _take(lines, fields[0], fields[1].decode("ascii", "replace")[:32], fields[2], fields[3].split())
+    return lines
+
+
+def _take(lines: _GroundLog, time: bytes, aircraft: str, message: bytes, fields: Sequence[bytes]) -> None:
+    time_s = _number_in(time)
+    if not np.isfinite(time_s) or (lines.aircraft and aircraft != lines.aircraft):
+        lines.others.update([aircraft] if len(lines.others) < 5 and aircraft != lines.aircraft else [])
+        return
+    if message == b"VERT_LOOP" and len(lines.loop_time_s) < _MAX_SAMPLES:
+        if (numbers := _whole(fields, len(FIELDS))) is not None:
+            lines.loop_time_s.append(time_s)
+            lines.loop.extend(numbers)
+            lines.aircraft = aircraft
+    elif message == b"ROTORCRAFT_FP" and len(lines.time_s) < _MAX_SAMPLES:
+        if (numbers := _whole(fields, 6)) is not None:
+            lines.time_s.append(time_s)
+            lines.up.append(numbers[2])
+            lines.up_speed.append(numbers[5])
+            lines.aircraft = aircraft
+    elif message == b"DL_VALUE" and lines.aircraft and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
+        number, value = _whole(fields, 1), _number_in(fields[1])
+        if number is not None and np.isfinite(value):
+            lines.values.append((time_s, number[0], value))
+
+
+def _columns(lines: _GroundLog, loop: LoopLog | None) -> dict[str, Column]:
     """Columns of the loop, and of the position if its message is more frequent."""
     channels = {} if loop is None else _loop_channels(loop)
     columns = {name: Column(loop.time_s, values, "VERT_LOOP") for name, values in channels.items() if loop is not None}
@@ -217,10 +277,28 @@ class _Configuration:
             group = self._groups[-1] if self._generated is None else self._generated
             group.append(f"k{match[1].lower()}" if match else "")
         elif kind == "define" and (match := _AIRFRAME_GAIN.fullmatch(given.get("name", ""))):
-            value = number_in(given.get("value", "").encode())
+            value = _number_in(given.get("value", "").encode())
             if np.isfinite(value):
                 self.known[f"k{match[1].lower()}"] = [(-np.inf, abs(value))]
 
 
 def _no_entities(*_declared: object) -> None:
     raise ValueError("it declares entities")
+
+
+def _whole(fields: Sequence[bytes], count: int) -> list[int] | None:
+    """The first fields as 32-bit integers; None if there are fewer, or other values."""
+    if len(fields) < count:
+        return None
+    try:
+        numbers = [int(each) for each in fields[:count]]
+    except ValueError:
+        return None
+    return numbers if min(numbers) >= INT32_MIN and max(numbers) <= INT32_MAX else None
+
+
+def _number_in(text: bytes) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan

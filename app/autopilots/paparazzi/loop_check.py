@@ -1,10 +1,17 @@
-"""Paparazzi's entry in the registry: its log of a flight, `.data` with VERT_LOOP, and traces with a row per step."""
+"""Paparazzi's entry in the registry: its log of a flight, `.data` with VERT_LOOP, and traces with a row per step: CSV,
+optionally gzipped, integers only.
+"""
 
+import csv
+import gzip
+import re
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import BinaryIO, Final
 
 import numpy as np
 
@@ -19,8 +26,7 @@ from app.autopilots.loop_check import (
     result_of_trace,
     signal_result,
 )
-from app.autopilots.paparazzi.ground_log import HINT
-from app.autopilots.paparazzi.log import PaparazziRecording, read_paparazzi
+from app.autopilots.paparazzi.log import HINT, PaparazziRecording, read_paparazzi
 from app.autopilots.paparazzi.replica.loop_log import COMMANDS, GAINS, CommandCheck, FlownGains, compare_commands
 from app.autopilots.paparazzi.replica.simulation import (
     SIMULATED,
@@ -30,14 +36,26 @@ from app.autopilots.paparazzi.replica.simulation import (
     SimulationCheck,
     compare_simulation,
 )
-from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_stream
-from app.core.control.vertical_guidance import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
+from app.core.control.vertical_guidance import (
+    INPUTS,
+    INT32_MAX,
+    INT32_MIN,
+    MODES,
+    OUTPUTS,
+    RATE_HZ,
+    LoopTrace,
+    replayed,
+)
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
 from app.core.records.overlaid import Overlay
 from app.logs.base import refused
 from app.logs.formats import Format
+from app.logs.trace_table import GZIP, TraceChecks, is_zipped, read_rows, text_of
 
+COLUMNS: Final = ("step", *INPUTS[:7], "zdd", *INPUTS[7:], *OUTPUTS)
+_INTEGER: Final = re.compile(r"[+-]?[0-9]{1,19}")
+_TRACE_HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row per 1/512 s, as 32-bit integers."
 _MAX_DIGITS: Final = 9
 
 _in_counts: Final = partial(Signal, difference_unit="counts")
@@ -131,6 +149,60 @@ def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
 
 def _is_whole(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= _MAX_DIGITS
+
+
+def read_loop_trace(path: Path) -> LoopTrace:
+    """Read `path` (.csv or .csv.gz). Raises InputError naming the line and the column of the first error."""
+    try:
+        with path.open("rb") as raw:
+            return _read_trace(TraceChecks(path.name, _TRACE_HINT), raw, zipped=path.suffix == ".gz")
+    except OSError as error:
+        raise InputError(
+            f"{path} could not be read: {error.strerror or error}.", hint="Use a readable trace file, .csv or .csv.gz."
+        ) from error
+
+
+def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
+    """As `read_loop_trace`, from a stream; gzip is detected from its first bytes."""
+    checks = TraceChecks(name, _TRACE_HINT)
+    try:
+        return _read_trace(checks, stream, zipped=is_zipped(stream))
+    except gzip.BadGzipFile as error:
+        raise checks.damaged(error) from error
+
+
+def may_be_loop_trace(head: bytes) -> bool:
+    """Whether a file with this head can be a trace: gzipped, or text whose first line names a column of a trace."""
+    first = head.partition(b"\n")[0]
+    return head.startswith(GZIP) or bool({b"mode", b"z_ref", b"r33"} & {column.strip() for column in first.split(b",")})
+
+
+def _read_trace(checks: TraceChecks, raw: BinaryIO, *, zipped: bool) -> LoopTrace:
+    with text_of(checks, raw, zipped=zipped) as text:
+        reader = csv.reader(text)
+        header = next(reader, [])
+        if problems := tuple(Problem(f"line 1, {each}", "column is missing") for each in COLUMNS if each not in header):
+            raise InputError(f"{checks.name} is not a trace of the vertical loop.", hint=_TRACE_HINT, problems=problems)
+        if len(header) != len(COLUMNS):
+            extra = next((column for column in header if column not in COLUMNS), header[-1])
+            raise checks.malformed(f"line 1, {extra}", "column is unknown or appears twice")
+        values = array("q", read_rows(checks, reader, header, _trace_value, first_line=2))
+    rows = np.array(values, dtype=np.int64).reshape(-1, len(header))
+    return LoopTrace(*(rows[:, [header.index(column) for column in columns]] for columns in (INPUTS, OUTPUTS)))
+
+
+def _trace_value(column: str, text: str) -> int:
+    if column == "mode":
+        if text not in MODES:
+            raise ValueError(f"must be one of {', '.join(MODES)}, got {text!r}")
+        return MODES[text]
+    if not _INTEGER.fullmatch(text):
+        raise ValueError(f"must be a whole number, got {text[:40]!r}")
+    value = int(text)
+    low, high = (0, 1) if column == "in_flight" else (INT32_MIN, INT32_MAX)
+    if not low <= value <= high:
+        raise ValueError(f"must be between {low} and {high}, got {value}")
+    return value
 
 
 def _examine_log(upload: Upload) -> Result:

@@ -10,7 +10,6 @@ from functools import partial
 from typing import Final
 
 from app.autopilots.dialects import FieldValue, Message, is_known, number, text
-from app.autopilots.paparazzi.simulated_estimator import FIX_S
 from app.autopilots.paparazzi.simulated_plan import (
     BLOCKS,
     DESCENT_M_S,
@@ -29,7 +28,7 @@ from app.autopilots.paparazzi.simulated_plan import (
     setting,
     settings,
 )
-from app.autopilots.paparazzi.simulated_telemetry import BARE_POSITION_PERIOD_S, MESSAGES, ReportingPaparazzi
+from app.autopilots.paparazzi.simulated_telemetry import BARE_POSITION_PERIOD_S, FIX_S, MESSAGES, ReportingPaparazzi
 from app.autopilots.simulated.body import (
     ACCEPTED,
     ARMED,

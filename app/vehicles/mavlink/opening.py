@@ -5,8 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from app.autopilots import signing
 from app.autopilots.commands import Target
+from app.autopilots.dialects import read_key
 from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
@@ -48,7 +48,7 @@ def open_radio(
         target_system=int(options["system_id"]) or None,
         make=profile.autopilot,
         tlog=_log_path(str(options["log_folder"])),
-        signing_key=signing.read_key(Path(key_file)) if key_file else None,
+        signing_key=read_key(Path(key_file)) if key_file else None,
         transport=transport,
         is_silent=is_silent,
     )
