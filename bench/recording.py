@@ -28,9 +28,8 @@ from typing import Final
 from app.autopilots.dialects import Message, number
 from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import ScaledClock
-from app.simdrone.body import new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server
-from app.simdrone.registry import get_autopilot
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.ground_observation import GroundObservation

@@ -8,11 +8,9 @@ from types import FrameType
 from app.cli.console import console
 from app.common.errors import InputError, Problem
 from app.core.clock import ScaledClock
-from app.simdrone.body import new_body
-from app.simdrone.drone import Drone, Server
-from app.simdrone.faults import parse_fault
+from app.simdrone.catalogue import AUTOPILOTS, get_autopilot, new_body
+from app.simdrone.drone import Drone, Server, parse_fault
 from app.simdrone.motion_capture import open_outlet
-from app.simdrone.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress

@@ -1,18 +1,50 @@
-"""A simulated drone: an autopilot with its body and faults, and its service on a link."""
+"""A simulated drone: an autopilot with its body and the faults that are injected into it, and its service on a link."""
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.dialects import Codec
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, OutgoingMessage, SimulatedAutopilot
 from app.core.clock import Clock
-from app.simdrone.faults import Faults, PlannedFault
+from app.core.errors import InputError, Problem
+from app.core.policy import is_finite
+from app.simdrone.fault_kinds import FAULTS, Fault
 from app.simdrone.motion_capture import MocapOutput, MotionCapture
 from app.vehicles.mavlink.transports import Transport
 
 BOOT_S: Final = 2.0
 """Silence after a reboot."""
+_FORM: Final = "NAME[:DURATION]@T, T in seconds after the takeoff command, or NAME[:DURATION]@connect"
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFault:
+    """A fault and its time: `start_s` after the takeoff command, None from the beginning; with an infinite
+    `duration_s` it does not end."""
+
+    fault: str
+    start_s: float | None
+    duration_s: float = float("inf")
+
+    def is_active(self, now_s: float, takeoff_s: float | None) -> bool:
+        """Whether it is active at `now_s`; both times are in seconds since the drone was switched on."""
+        if self.start_s is None:
+            return now_s < self.duration_s
+        return takeoff_s is not None and 0.0 <= now_s - takeoff_s - self.start_s < self.duration_s
+
+
+def parse_fault(text: str) -> PlannedFault:
+    """Parse a fault of `_FORM`. Raises InputError with the reason if it is invalid."""
+    what, at, when = text.partition("@")
+    name, colon, duration = what.partition(":")
+    if name not in FAULTS:
+        raise _unusable(f"must be one of {', '.join(FAULTS)}, got {name!r}")
+    if not at:
+        raise _unusable(f"must have a time: {_FORM}")
+    start_s = None if when == "connect" else _seconds(when)
+    return PlannedFault(name, start_s, _seconds(duration)) if colon else PlannedFault(name, start_s)
 
 
 class Drone:
@@ -31,7 +63,8 @@ class Drone:
         self._outlet = outlet
         self.autopilot = switch_on(body)
         self._switch_on = switch_on
-        self._faults = Faults(faults)
+        self._planned = [(plan, FAULTS[plan.fault]()) for plan in faults]
+        self._active: list[tuple[PlannedFault, Fault]] = []
         self._codecs: dict[tuple[str, int], Codec] = {}
         self._ticks = 0
         self._silent_until_s = 0.0
@@ -44,25 +77,31 @@ class Drone:
 
     def inject_fault(self, fault: str, duration_s: float = float("inf")) -> None:
         """Begin a fault of `FAULTS` with the next tick."""
-        self._faults.add(PlannedFault(fault, None, self.time_s + duration_s))
+        self._planned.append((PlannedFault(fault, None, self.time_s + duration_s), FAULTS[fault]()))
 
     def receive(self, data: bytes) -> None:
         """Process bytes received over the link."""
-        if not self._faults.receives_nothing and self.time_s >= self._silent_until_s:
+        is_deaf = any(fault.receives_nothing for _, fault in self._active)
+        if not is_deaf and self.time_s >= self._silent_until_s:
             self.autopilot.receive(data)
 
     def tick(self) -> list[bytes]:
         """Advance by one tick; return the packets sent. Raises VehicleError if the simulation diverged."""
-        self._faults.update(self.time_s, self._takeoff_s, self)
+        self._begin_and_end_faults()
         self._ticks += 1
         seen = self._outlet.send(self.cameras.advance(self.time_s, self.body.altitude_m)) if self._outlet else []
         if self.time_s < self._silent_until_s:
             self.body.advance(TICK_STEPS, MOTORS_OFF)
             return []
-        messages = self._faults.messages([*self.autopilot.tick(), *seen])
+        messages = [*self.autopilot.tick(), *seen]
+        for _, fault in self._active:
+            messages = fault.transform_messages(messages)
         if self._takeoff_s is None and self.autopilot.took_off:
             self._takeoff_s = self.time_s
-        return self._faults.frames([self._packed(message) for message in messages])
+        frames = [self._packed(message) for message in messages]
+        for _, fault in self._active:
+            frames = fault.transform_frames(frames)
+        return frames
 
     def reboot(self) -> None:
         """Restart the autopilot in any state of the body; its faults persist."""
@@ -72,6 +111,17 @@ class Drone:
         self.autopilot.ignores_parameters = before.ignores_parameters
         self._codecs.clear()
         self._silent_until_s = self.time_s + BOOT_S
+
+    def _begin_and_end_faults(self) -> None:
+        """Begin and end faults at their times; each occurs once."""
+        now_s, takeoff_s = self.time_s, self._takeoff_s
+        for entry in [each for each in self._planned if each[0].is_active(now_s, takeoff_s)]:
+            self._planned.remove(entry)
+            self._active.append(entry)
+            entry[1].begin(self)
+        for entry in [each for each in self._active if not each[0].is_active(now_s, takeoff_s)]:
+            self._active.remove(entry)
+            entry[1].end(self)
 
     def _packed(self, message: OutgoingMessage) -> bytes:
         system = message.system or self.autopilot.system
@@ -114,7 +164,8 @@ class Server:
             behind_s -= lost_s
             self._receive(self._clock.wall_s(TICK_S - behind_s))
             for _ in range(min(int(behind_s / TICK_S), TICKS_AT_ONCE)):
-                self._send(self._drone.tick())
+                for frame in self._drone.tick():
+                    self._transport.write(frame)
 
     def stop(self) -> None:
         """Make `run` return soon; from any thread or a signal handler."""
@@ -129,6 +180,20 @@ class Server:
             if peer == self._transport.remote:
                 self._drone.receive(data)
 
-    def _send(self, frames: list[bytes]) -> None:
-        for frame in frames:
-            self._transport.write(frame)
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = float("nan")
+    if not (is_finite(seconds) and seconds >= 0.0):
+        raise _unusable(f"a time must be a number of seconds, 0 or more, got {text!r}")
+    return seconds
+
+
+def _unusable(reason: str) -> InputError:
+    return InputError(
+        "This fault is not valid.",
+        problems=(Problem("fault", reason),),
+        hint="For example link-lost:8@6, reboot@5 or no-heartbeat@connect.",
+    )

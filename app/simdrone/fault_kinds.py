@@ -135,19 +135,17 @@ def _drift(drone: FaultTarget, on: bool) -> None:
     drone.cameras.drifts = on
 
 
-class LinkLost(Fault):
-    """No packets pass in either direction; the autopilot continues to fly."""
-
-    receives_nothing = True
-
-    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002 - none of them passes
-        return []
-
-
 class Deaf(Fault):
     """The drone receives nothing; its own packets arrive."""
 
     receives_nothing = True
+
+
+class LinkLost(Deaf):
+    """No packets pass in either direction; the autopilot continues to fly."""
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002 - none of them passes
+        return []
 
 
 @dataclass
@@ -222,7 +220,16 @@ class LowBattery(ChangedMessages):
     kinds = ("SYS_STATUS", "BATTERY_STATUS")
 
     def change(self, message: OutgoingMessage) -> Fields:
-        return _drained(message.fields)
+        low: dict[str, FieldValue] = {}
+        if "voltage_battery" in message.fields:
+            low["voltage_battery"] = _LOW_MV
+        voltages = message.fields.get("voltages")
+        if isinstance(voltages, Sequence) and not isinstance(voltages, str | bytes):
+            low["voltages"] = [_LOW_MV, *voltages[1:]]
+        share = message.fields.get("battery_remaining")
+        if isinstance(share, int) and share >= 0:
+            low["battery_remaining"] = 10
+        return low
 
 
 @dataclass
@@ -336,17 +343,3 @@ def _value(message: OutgoingMessage, field: str) -> float:
     if not isinstance(value, int | float):
         raise TypeError(f"{message.kind}.{field} is not a number")
     return value
-
-
-def _drained(fields: Fields) -> Fields:
-    """Return the fields with low values for the battery."""
-    low: dict[str, FieldValue] = dict(fields)
-    if "voltage_battery" in low:
-        low["voltage_battery"] = _LOW_MV
-    voltages = low.get("voltages")
-    if isinstance(voltages, Sequence) and not isinstance(voltages, str | bytes):
-        low["voltages"] = [_LOW_MV, *voltages[1:]]
-    share = low.get("battery_remaining")
-    if isinstance(share, int) and share >= 0:
-        low["battery_remaining"] = 10
-    return low

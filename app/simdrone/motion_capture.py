@@ -152,7 +152,9 @@ class NatNetServer:
             except (BlockingIOError, ConnectionError):
                 return
             if data[:2] == struct.pack("<H", _CONNECT):
-                self._send(server_packet(self._version), peer)
+                # name, application version, protocol version, clock rate
+                info = struct.pack("<256s4B4BQ", b"Gainline sim-drone", 3, 1, 0, 0, *self._version, _TICKS_HZ)
+                self._send(_packet(_SERVER_INFO, info), peer)
             if not self._address.multicast:
                 self._listeners.add(peer)
 
@@ -172,11 +174,6 @@ def open_outlet(address: SourceAddress) -> MocapOutput:
             return VehicleLinkOutput()
         case StreamAddress():
             return OdometryOutput(address)
-
-
-def server_packet(version: Version) -> bytes:
-    """Return NAT_SERVERINFO: name, application version, protocol version, clock rate."""
-    return _packet(_SERVER_INFO, struct.pack("<256s4B4BQ", b"Gainline sim-drone", 3, 1, 0, 0, *version, _TICKS_HZ))
 
 
 def frame_packet(sample: MocapFrame, body: int, *, up: str) -> bytes:

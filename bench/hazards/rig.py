@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.dialects import FieldValue
-from app.simdrone.body import new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import BOOT_S, Drone
 from app.simdrone.motion_capture import VehicleLinkOutput
-from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink_kind import MAVLINK

@@ -11,8 +11,8 @@ from pymavlink.dialects.v10 import paparazzi as mavlink
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
+from app.simdrone.catalogue import AUTOPILOTS
 from app.simdrone.fault_kinds import FAULTS
-from app.simdrone.registry import AUTOPILOTS
 from tests.waiting import Waits
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "sim-drone.md").read_text()

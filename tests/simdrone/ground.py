@@ -14,11 +14,9 @@ from typing import Any, Final, Protocol
 
 from app.autopilots.simulated.body import TICK_S, Make
 from app.core.clock import Clock, ScaledClock
-from app.simdrone.body import new_body
-from app.simdrone.drone import CATCH_UP_S, Drone, Server
-from app.simdrone.faults import parse_fault
+from app.simdrone.catalogue import get_autopilot, new_body
+from app.simdrone.drone import CATCH_UP_S, Drone, Server, parse_fault
 from app.simdrone.motion_capture import MocapOutput
-from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.transports import open_transport

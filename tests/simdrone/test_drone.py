@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, throttle_command
 from app.core.control.vertical_guidance import RATE_HZ
 from app.core.errors import InputError
-from app.simdrone.body import new_body
+from app.simdrone.catalogue import AUTOPILOTS, get_autopilot, new_body
 from app.simdrone.drone import CATCH_UP_S
-from app.simdrone.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
 from tests.ports import free_port

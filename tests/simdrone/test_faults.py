@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from app.core.errors import InputError
-from app.simdrone.drone import Drone
+from app.simdrone.drone import Drone, PlannedFault, parse_fault
 from app.simdrone.fault_kinds import FAULTS
-from app.simdrone.faults import PlannedFault, parse_fault
 from tests.simdrone import copters
 from tests.simdrone.ground import Ground, Heard, LockstepWire, flying
 from tests.simdrone.paparazzi import GROUND_M, LAND_HERE, PLAN_M, Pilot, from_vehicle

@@ -8,7 +8,7 @@ import pytest
 
 from app.autopilots.simulated.body import VerticalCommand
 from app.core.control.vertical_guidance import ALT
-from app.simdrone.body import packed
+from app.simdrone.catalogue import packed
 from app.vehicles.registry import check_options
 from app.vehicles.twin import TwinFlight
 from tests.simdrone.ground import STILL, Ground, Heard, flying

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v10 import paparazzi as mavlink
 
-from app.simdrone.body import new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone
-from app.simdrone.registry import get_autopilot
 from tests.simdrone.ground import Heard
 from tests.simdrone.paparazzi import ARMED, LANDED, START_ENGINE, SYSTEM, TAKEOFF, from_vehicle, recorded
 

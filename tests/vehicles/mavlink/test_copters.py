@@ -16,7 +16,6 @@ from app.autopilots.measurements import VehicleEvent
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.simulated import Px4
 from app.autopilots.simulated.body import OutgoingMessage
-from app.simdrone import faults
 from app.simdrone.fault_kinds import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
 from app.vehicles.flight_end import StopRequest
@@ -113,7 +112,7 @@ class AltitudeAnew(Fault):
 def test_heights_count_from_the_ground_though_the_altitude_begins_anew_at_arming(
     autopilot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(faults, "FAULTS", {AltitudeAnew.name: AltitudeAnew})
+    monkeypatch.setattr("app.simdrone.drone.FAULTS", {AltitudeAnew.name: AltitudeAnew})
     with LockstepRig(autopilot, faults=["altitude-anew@connect"]) as rig:
         rig.switch_on_failsafes()
         with connected(rig) as vehicle:

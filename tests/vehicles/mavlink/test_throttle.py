@@ -15,7 +15,6 @@ from app.autopilots.measurements import Measurement, Throttle
 from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.simulated.body import OutgoingMessage
 from app.core.experiments.takeoff import Takeoff
-from app.simdrone import faults
 from app.simdrone.fault_kinds import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Sample
 from tests.vehicles.flying import Watcher, never
@@ -84,7 +83,7 @@ def flown(autopilot: str, fault: "type[Hostile] | None" = None) -> Flown:
 def _flown(autopilot: str, fault: str) -> Flown:
     watcher = Watcher()
     with (
-        mock.patch.object(faults, "FAULTS", {kind.name: kind for kind in Hostile.__subclasses__()}),
+        mock.patch("app.simdrone.drone.FAULTS", {kind.name: kind for kind in Hostile.__subclasses__()}),
         LockstepRig(autopilot, faults=[f"{fault}@connect"] if fault else []) as rig,
     ):
         if autopilot != "paparazzi":

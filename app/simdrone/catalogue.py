@@ -1,4 +1,5 @@
-"""Airframes of simulated drones: the simulations of vehicle kinds, as the flights of a body."""
+"""What simulated drones are made of: the registry of simulated autopilots, and airframes, the simulations of vehicle
+kinds as the flights of a body."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +8,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from app.autopilots.simulated.body import MOTORS_OFF, TICK_STEPS, Body, VerticalCommand
+from app.autopilots import registry
+from app.autopilots.simulated.body import MOTORS_OFF, TICK_STEPS, Body, SimulatedKind, VerticalCommand
 from app.core.control.vertical_guidance import Z_SUM_ERR
 from app.core.errors import InputError, Problem
 from app.vehicles.base import OptionValue, VehicleError
@@ -16,6 +18,21 @@ from app.vehicles.kernels import ALTITUDE, BATTERY, CLIMB_RATE, COMMAND_SIZE, KD
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.simulated import Simulation
 from app.vehicles.twin import TWIN, TwinFlight
+
+AUTOPILOTS: Final[Mapping[str, SimulatedKind]] = MappingProxyType(
+    {kind.name: kind for autopilot in registry.AUTOPILOTS.values() for kind in autopilot.simulated()}
+)
+
+
+def get_autopilot(name: str) -> SimulatedKind:
+    """Return the autopilot of this name. Raises InputError if it is unknown."""
+    if name not in AUTOPILOTS:
+        raise InputError(
+            "This simulated autopilot is unknown.",
+            problems=(Problem("autopilot", f"must be one of {', '.join(AUTOPILOTS)}, got {name!r}"),),
+            hint="gainline sim-drone --help lists them.",
+        )
+    return AUTOPILOTS[name]
 
 
 class Simulated(Simulation, Protocol):
@@ -47,17 +64,10 @@ class _Flight:
         self.simulation.autopilot[Z_SUM_ERR] = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Airframe:
-    """A vehicle kind whose simulation a drone can fly; `flight` creates it from options and seed."""
-
-    kind: VehicleKind
-    flight: Callable[[dict[str, float], int], Simulated]
-
-
-AIRFRAMES: Final[Mapping[str, Airframe]] = MappingProxyType(
-    {"jsbsim": Airframe(JSBSIM, JsbsimFlight), "twin": Airframe(TWIN, TwinFlight)}
+AIRFRAMES: Final[Mapping[str, tuple[VehicleKind, Callable[[dict[str, float], int], Simulated]]]] = MappingProxyType(
+    {"jsbsim": (JSBSIM, JsbsimFlight), "twin": (TWIN, TwinFlight)}
 )
+"""Vehicle kinds whose simulation a drone can fly, each with what creates it from options and seed."""
 
 
 def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> Body:
@@ -68,7 +78,7 @@ def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> 
             problems=(Problem("vehicle", f"must be one of {', '.join(AIRFRAMES)}, got {vehicle!r}"),),
             hint="jsbsim has six degrees of freedom; twin is a simple model with the real flights' scatter.",
         )
-    airframe = AIRFRAMES[vehicle]
-    numbers = {name: float(value) for name, value in airframe.kind.check(options, field="vehicle").items()}
-    _Flight(airframe.flight(numbers, seed)).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
-    return Body(lambda flight_seed: _Flight(airframe.flight(numbers, flight_seed)), seed=seed)
+    kind, simulate = AIRFRAMES[vehicle]
+    numbers = {name: float(value) for name, value in kind.check(options, field="vehicle").items()}
+    _Flight(simulate(numbers, seed)).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
+    return Body(lambda flight_seed: _Flight(simulate(numbers, flight_seed)), seed=seed)
