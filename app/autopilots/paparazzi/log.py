@@ -21,7 +21,6 @@ from app.autopilots.paparazzi.replica.loop_log import FIELDS, GAINS, FlownGains,
 from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
 from app.core.control.vertical_guidance import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.policy import Gains
-from app.core.records.trajectory import Samples
 from app.logs.base import refused
 from app.logs.formats import head_of, is_ground_log
 
@@ -66,7 +65,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
         clock="ground",
         columns=_columns(lines, loop),
         settings=list(configuration.settings(flown)),
-        events=[] if loop is None else [*_starts(loop), *_ends(loop)],
+        events=[] if loop is None else list(_events(loop)),
         notes=list(configuration.notes(flown)),
         remarks=[f"other aircraft in the log left out: {others}"] if others else [],
         loop=loop,
@@ -130,8 +129,7 @@ def _take(lines: _GroundLog, time: bytes, aircraft: str, message: bytes, fields:
 
 def _columns(lines: _GroundLog, loop: LoopLog | None) -> dict[str, Column]:
     """Columns of the loop, and of the position if its message is more frequent."""
-    channels = {} if loop is None else _loop_channels(loop)
-    columns = {name: Column(loop.time_s, values, "VERT_LOOP") for name, values in channels.items() if loop is not None}
+    columns = {} if loop is None else _loop_columns(loop)
     if len(lines.loop_time_s) >= len(lines.time_s):
         return columns
     rows = increasing(np.array(lines.time_s))
@@ -142,9 +140,9 @@ def _columns(lines: _GroundLog, loop: LoopLog | None) -> dict[str, Column]:
     }
 
 
-def _loop_channels(log: LoopLog) -> dict[str, Samples]:
+def _loop_columns(log: LoopLog) -> dict[str, Column]:
     """Altitudes in metres, positive up; commands as shares of full thrust."""
-    return {
+    channels = {
         "altitude_m": -log["z"] / 2**8,
         "climb_rate_m_s": -log["zd"] / 2**19,
         "set_point_m": -log["z_sp"] / 2**8,
@@ -153,29 +151,23 @@ def _loop_channels(log: LoopLog) -> dict[str, Samples]:
         "feed_forward": log["ff_cmd"] / FULL_THRUST,
         "feedback": log["fb_cmd"] / FULL_THRUST,
     }
+    return {name: Column(log.time_s, values, "VERT_LOOP") for name, values in channels.items()}
 
 
-def _starts(log: LoopLog) -> list[Event]:
-    """The last samples before the reference starts to move by itself."""
-    idle = log.idle
-    sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
-    return [Event(EventKind.TAKEOFF, float(log.time_s[place]), "the reference starting to move") for place in sets_out]
-
-
-def _ends(log: LoopLog) -> list[Event]:
-    """Times at which a set point that was held for two seconds changes, or the loop becomes inactive."""
+def _events(log: LoopLog) -> Iterator[Event]:
+    """The last samples before the reference starts to move by itself; when the loop becomes inactive; and when a set
+    point that was held for two seconds changes."""
     idle, set_point = log.idle, log["z_sp"]
-    stops = np.flatnonzero(~idle[:-1] & idle[1:])
-    moments = [Event(EventKind.COMMAND, float(log.time_s[place]), "the loop being switched off") for place in stops]
+    for place in np.flatnonzero(idle[:-1] & ~idle[1:]):
+        yield Event(EventKind.TAKEOFF, float(log.time_s[place]), "the reference starting to move")
+    for place in np.flatnonzero(~idle[:-1] & idle[1:]):
+        yield Event(EventKind.COMMAND, float(log.time_s[place]), "the loop being switched off")
     held_since_s = float(log.time_s[0])
-    for place in np.flatnonzero(np.diff(set_point) != 0).tolist():
+    for place in np.flatnonzero(np.diff(set_point) != 0):
         now_s, is_working = float(log.time_s[place]), not idle[place] and not idle[place + 1]
         if is_working and now_s - held_since_s >= _PLATEAU_S:
-            moments.append(
-                Event(EventKind.COMMAND, now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m")
-            )
+            yield Event(EventKind.COMMAND, now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m")
         held_since_s = float(log.time_s[place + 1])
-    return moments
 
 
 @dataclass(slots=True)

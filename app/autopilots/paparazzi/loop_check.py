@@ -56,7 +56,6 @@ from app.logs.trace_table import GZIP, TraceChecks, is_zipped, read_rows, text_o
 COLUMNS: Final = ("step", *INPUTS[:7], "zdd", *INPUTS[7:], *OUTPUTS)
 _INTEGER: Final = re.compile(r"[+-]?[0-9]{1,19}")
 _TRACE_HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row per 1/512 s, as 32-bit integers."
-_MAX_DIGITS: Final = 9
 
 _in_counts: Final = partial(Signal, difference_unit="counts")
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
@@ -73,7 +72,6 @@ _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
 TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 _BEYOND: Final = f"beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty"
 _STEP_APART: Final = "compared bit for bit; fields may be one step of 1/512 s apart"
-_COUNTED: Final = f"only differences beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty count"
 _DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 m."
 
 
@@ -138,17 +136,13 @@ def check_log(recording: PaparazziRecording, *, name: str, given: Mapping[str, f
 def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
     """Parse gains from `KP,KI,KD`. Raises InputError that names `field`."""
     parts = given.split(",")
-    if len(parts) != len(GAINS) or not all(_is_whole(part.strip()) for part in parts):
+    if len(parts) != len(GAINS) or not all(re.fullmatch("[0-9]{1,9}", part.strip()) for part in parts):
         raise InputError(
             f"{given[:60]!r} is not a gain set.",
             problems=(Problem(field, "must be three whole numbers, KP,KI,KD"),),
             hint="For example 283,13,82.",
         )
     return {name: float(part) for name, part in zip(GAINS, parts, strict=True)}
-
-
-def _is_whole(text: str) -> bool:
-    return text.isascii() and text.isdecimal() and len(text) <= _MAX_DIGITS
 
 
 def read_loop_trace(path: Path) -> LoopTrace:
@@ -160,15 +154,6 @@ def read_loop_trace(path: Path) -> LoopTrace:
         raise InputError(
             f"{path} could not be read: {error.strerror or error}.", hint="Use a readable trace file, .csv or .csv.gz."
         ) from error
-
-
-def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
-    """As `read_loop_trace`, from a stream; gzip is detected from its first bytes."""
-    checks = TraceChecks(name, _TRACE_HINT)
-    try:
-        return _read_trace(checks, stream, zipped=is_zipped(stream))
-    except gzip.BadGzipFile as error:
-        raise checks.damaged(error) from error
 
 
 def may_be_loop_trace(head: bytes) -> bool:
@@ -207,27 +192,7 @@ def _trace_value(column: str, text: str) -> int:
 
 def _examine_log(upload: Upload) -> Result:
     recording = read_paparazzi(upload.stream, upload.companion)
-    return _result_of_log(check_log(recording, name=upload.name, given=upload.given))
-
-
-def _examine_trace(upload: Upload) -> Result:
-    trace = read_loop_trace_stream(upload.stream, name=upload.name)
-    return result_of_trace(_SIGNALS, _replayed(trace))
-
-
-def _replayed(trace: LoopTrace) -> TraceReplay:
-    constant = {name: np.unique(trace.inputs[:, INPUTS.index(name)]) for name in GAINS}
-    is_constant = all(len(values) == 1 for values in constant.values())
-    return TraceReplay(
-        time_s=np.arange(len(trace)) / RATE_HZ,
-        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
-        replica=dict(zip(OUTPUTS, replayed(trace).T, strict=True)),
-        gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
-        notes=(_DOWN,),
-    )
-
-
-def _result_of_log(checked: LogCheck) -> Result:
+    checked = check_log(recording, name=upload.name, given=upload.given)
     commands, simulation = checked.commands, checked.simulation
     *simulated, drawn = checked.overlays
     apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
@@ -236,8 +201,9 @@ def _result_of_log(checked: LogCheck) -> Result:
         for name, difference in apart.items()
     ]
     if simulation is not None:
+        counted = f"only differences {_BEYOND} count"
         judged = {
-            name: replace(_SIGNALS[name], tolerance=allowed, allowance=_COUNTED, difference_unit=TOLERANCE_UNITS[name])
+            name: replace(_SIGNALS[name], tolerance=allowed, allowance=counted, difference_unit=TOLERANCE_UNITS[name])
             for name, allowed in TOLERANCES.items()
         }
         signals[:0] = [
@@ -256,6 +222,24 @@ def _result_of_log(checked: LogCheck) -> Result:
         signals=tuple(signals),
         curves=curves(_SIGNALS, checked.overlays),
     )
+
+
+def _examine_trace(upload: Upload) -> Result:
+    checks = TraceChecks(upload.name, _TRACE_HINT)
+    try:
+        trace = _read_trace(checks, upload.stream, zipped=is_zipped(upload.stream))
+    except gzip.BadGzipFile as error:
+        raise checks.damaged(error) from error
+    constant = {name: np.unique(trace.inputs[:, INPUTS.index(name)]) for name in GAINS}
+    is_constant = all(len(values) == 1 for values in constant.values())
+    replay = TraceReplay(
+        time_s=np.arange(len(trace)) / RATE_HZ,
+        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
+        replica=dict(zip(OUTPUTS, replayed(trace).T, strict=True)),
+        gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
+        notes=(_DOWN,),
+    )
+    return result_of_trace(_SIGNALS, replay)
 
 
 def _log_sentence(checked: LogCheck) -> str:
@@ -286,17 +270,7 @@ def _notes(checked: LogCheck) -> Iterable[str]:
     yield from (f"{note[0].upper()}{note[1:]}." for note in checked.gain_notes)
     if checked.better_gains is not None:
         yield f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?"
-    yield from _notes_on(checked.commands)
-    if checked.simulation is None:
-        yield "Reference and integrator were not simulated: no command in the log, or another command within 2 s."
-    else:
-        yield (
-            f"Reference and integrator were simulated again from the command at {checked.simulation.command_s:.3f} s "
-            f"for {checked.simulation.duration_s:.1f} s."
-        )
-
-
-def _notes_on(commands: CommandCheck) -> Iterable[str]:
+    commands = checked.commands
     if commands.tilted:
         tilt = f"{commands.largest_tilt_deg:.1f}°"
         yield f"Commands reproduced under a tilt of up to {tilt}: {grouped(commands.tilted)}."
@@ -305,6 +279,13 @@ def _notes_on(commands: CommandCheck) -> Iterable[str]:
     for fields, count in commands.stale.items():
         if count:
             yield f"Commands reproduced only with the {fields} one step apart: {grouped(count)}."
+    if checked.simulation is None:
+        yield "Reference and integrator were not simulated: no command in the log, or another command within 2 s."
+    else:
+        yield (
+            f"Reference and integrator were simulated again from the command at {checked.simulation.command_s:.3f} s "
+            f"for {checked.simulation.duration_s:.1f} s."
+        )
 
 
 CHECK: Final = LoopCheck(

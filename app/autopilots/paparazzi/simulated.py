@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final
 
-from app.autopilots.dialects import FieldValue, Message, is_known, number, text
+from app.autopilots.dialects import Message, is_known, number, text
 from app.autopilots.paparazzi.simulated_plan import (
     BLOCKS,
     DESCENT_M_S,
@@ -28,7 +28,18 @@ from app.autopilots.paparazzi.simulated_plan import (
     setting,
     settings,
 )
-from app.autopilots.paparazzi.simulated_telemetry import BARE_POSITION_PERIOD_S, FIX_S, MESSAGES, ReportingPaparazzi
+from app.autopilots.paparazzi.simulated_telemetry import (
+    BARE_POSITION_PERIOD_S,
+    BY_HAND,
+    FAILSAFE,
+    FIX_TICKS,
+    GUIDED,
+    HOME,
+    KILL,
+    MESSAGES,
+    NAV,
+    ReportingPaparazzi,
+)
 from app.autopilots.simulated.body import (
     ACCEPTED,
     ARMED,
@@ -38,6 +49,7 @@ from app.autopilots.simulated.body import (
     TICK_STEPS,
     UNSUPPORTED,
     Body,
+    Fields,
     Make,
     SimulatedKind,
     VerticalCommand,
@@ -46,20 +58,11 @@ from app.autopilots.simulated.body import (
 )
 from app.core.control.vertical_guidance import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
 
-KILL: Final = 0
-FAILSAFE: Final = 1
-HOME: Final = 2
-BY_HAND: Final = 12
-NAV: Final = 13
-MODES: Final = (KILL, FAILSAFE, HOME, BY_HAND, NAV, 19)
+MODES: Final = (KILL, FAILSAFE, HOME, BY_HAND, NAV, GUIDED)
 _WITHOUT_PLAN: Final = (KILL, FAILSAFE, HOME, BY_HAND)
 """Modes in which no block is flown."""
-_KEEP_THEIR_BLOCK: Final = (HOME, BY_HAND)
 FAILSAFE_DESCENT_M_S: Final = 1.3
 HOMING_M_S: Final = 3.0
-
-POSITION_AFTER_S: Final = 1.0
-"""Time from the start until the position is known."""
 
 RECEIVE_BUFFER: Final = 256
 TRANSACTION_S: Final = 15.3
@@ -73,12 +76,11 @@ _HIGHEST_M: Final = 10_000.0
 
 _POLL_TICKS: Final = whole_ticks(0.018)
 _NAV_TICKS: Final = 16
-_FIX_TICKS: Final = whole_ticks(FIX_S)
 _BLOCK_TICKS: Final = whole_ticks(0.1)
 
 _IDLE_THRUST: Final = 500 / 9600
-_GROUNDED_S: Final = 1.0
-_FLYING_S: Final = 1.0
+_COUNTS_AFTER_S: Final = 1.0
+"""Time with thrust, or without, after which it counts as flying, or not."""
 _TOUCHES_BELOW_M: Final = 0.03
 _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
 """Time by which the reference (ζ 0.85, 100 °/s) lags behind a moving set point."""
@@ -101,8 +103,9 @@ class Paparazzi(ReportingPaparazzi):
         sends_mode: bool = False,
     ) -> None:
         super().__init__(body, settings(kill_setting), system=system, sends_mode=sends_mode)
-        self.position_after_s = POSITION_AFTER_S
-        self._radio = _Radio()
+        self.position_after_s = 1.0
+        """Time from the start until the position is known."""
+        self._received = bytearray()
         self._kill_setting = kill_setting
         self._plan = FlightPlan(landed_after_s=landed_after_s)
         self._max_distance_m = max_distance_m
@@ -121,7 +124,7 @@ class Paparazzi(ReportingPaparazzi):
     # ------------------------------------------------------------ time
 
     def receive(self, data: bytes) -> None:
-        self._radio.put(data)
+        self._received += data
 
     def advance(self) -> None:
         if self._ticks % _POLL_TICKS == 0:
@@ -130,7 +133,7 @@ class Paparazzi(ReportingPaparazzi):
             self._navigate()
         command = self._command()
         self.body.advance(TICK_STEPS, command)
-        if self._ticks % _FIX_TICKS == 0:
+        if self._ticks % FIX_TICKS == 0:
             is_driven = command is not MOTORS_OFF and not self.body.motors_dead
             self.estimator.fix(self.body.altitude_m, self.body.climb_rate_m_s, is_driven=is_driven)
         self._watch_thrust()
@@ -182,7 +185,8 @@ class Paparazzi(ReportingPaparazzi):
         distance_m = abs(self.north_m)
         if self.mode == NAV and distance_m > self._max_distance_m:
             self._set_mode(HOME)
-        self.body.steered_m_s = -self._homing_m_s() if self.mode == HOME else 0.0
+        homing_m_s = -min(max(self.north_m, -HOMING_M_S), HOMING_M_S)  # slower over the last metres
+        self.body.steered_m_s = homing_m_s if self.mode == HOME else 0.0
         if self.mode in _WITHOUT_PLAN:
             return
         has_position = self.boot_s >= self.position_after_s
@@ -194,10 +198,6 @@ class Paparazzi(ReportingPaparazzi):
                 self.refer_to_ground()
             self._enter(following)
 
-    def _homing_m_s(self) -> float:
-        """Return the speed towards HOME, slower over the last metres."""
-        return min(max(self.north_m, -HOMING_M_S), HOMING_M_S)
-
     def _command(self) -> VerticalCommand:
         if not self.armed:
             return MOTORS_OFF
@@ -207,7 +207,7 @@ class Paparazzi(ReportingPaparazzi):
             case Vertical.THROTTLE:
                 return MOTORS_OFF
             case Vertical.WAYPOINT:
-                return self._altitude(self._plan.target_m)
+                return self._altitude(self._plan.altitudes_m[self._plan.block.waypoint])
             case Vertical.DESCEND:
                 return self._descent()
 
@@ -241,9 +241,9 @@ class Paparazzi(ReportingPaparazzi):
         pushes = self.body.thrust > _IDLE_THRUST
         self._thrust_s = self._thrust_s + TICK_S if pushes else 0.0
         self._idle_s = 0.0 if pushes else self._idle_s + TICK_S
-        if self._thrust_s >= _FLYING_S:
+        if self._thrust_s >= _COUNTS_AFTER_S:
             self._flies = True
-        elif self.body.is_resting or self._idle_s >= _GROUNDED_S:
+        elif self.body.is_resting or self._idle_s >= _COUNTS_AFTER_S:
             self._flies = False
 
     # ------------------------------------------------------------ sending
@@ -259,13 +259,22 @@ class Paparazzi(ReportingPaparazzi):
         """Send a setting; a place past the end sends what is behind the table, as the real one does."""
         count = len(self.parameters)
         known, value = self.parameters.at(place) if place < count else (_BEHIND, math.nan)
-        fields: dict[str, FieldValue] = {"param_id": known.name, "param_value": value, "param_count": count}
-        self._send("PARAM_VALUE", {**fields, "param_type": _REAL32, "param_index": place})
+        fields: Fields = {
+            "param_id": known.name,
+            "param_value": value,
+            "param_type": _REAL32,
+            "param_count": count,
+            "param_index": place,
+        }
+        self._send("PARAM_VALUE", fields)
 
     # ------------------------------------------------------------ receiving
 
     def _listen(self) -> None:
-        for message in self._codec.parse(self._radio.take()):
+        """Process what was received since the last poll; if it does not fit into the buffer, it is lost entirely."""
+        data = bytes(self._received) if len(self._received) <= RECEIVE_BUFFER else b""
+        self._received.clear()
+        for message in self._codec.parse(data):
             if not is_known(message) or message.get_msgbuf()[0] != _MAVLINK_1:
                 continue
             handler = _HANDLERS.get(message.get_type())
@@ -311,19 +320,19 @@ class Paparazzi(ReportingPaparazzi):
         self._send("DATA_STREAM", {"stream_id": stream, "message_rate": 0, "on_off": 0})
 
     def _on_block_list(self, message: Message) -> None:
-        self._begin_transaction()
+        self._transaction_ends_s = self.boot_s + TRANSACTION_S
         self._send("SCRIPT_COUNT", {"count": len(BLOCKS), **sender(message)}, "blocks")
 
     def _on_block_request(self, message: Message) -> None:
         seq = int(number(message, "seq"))
         if not self._is_listing_blocks or seq >= len(BLOCKS):
             return
-        self._begin_transaction()
+        self._transaction_ends_s = self.boot_s + TRANSACTION_S
         self._send("SCRIPT_ITEM", {"seq": seq, "name": BLOCKS[seq].name, **sender(message)}, "blocks")
 
     def _on_block(self, message: Message) -> None:
         """Enter a block, unless the list is being read or no block is flown; there is no reply in any case."""
-        if not self._is_listing_blocks and self.mode not in _KEEP_THEIR_BLOCK:
+        if not self._is_listing_blocks and self.mode not in (HOME, BY_HAND):
             self._enter(int(number(message, "seq")))
 
     def _on_mission_ack(self, _message: Message) -> None:
@@ -340,29 +349,6 @@ class Paparazzi(ReportingPaparazzi):
     @property
     def _is_listing_blocks(self) -> bool:
         return self.boot_s < self._transaction_ends_s
-
-    def _begin_transaction(self) -> None:
-        self._transaction_ends_s = self.boot_s + TRANSACTION_S
-
-
-class _Radio:
-    """Receive buffer: data between two polls that does not fit is lost entirely."""
-
-    def __init__(self) -> None:
-        self._waiting = bytearray()
-        self._overrun = False
-
-    def put(self, data: bytes) -> None:
-        if len(self._waiting) + len(data) > RECEIVE_BUFFER:
-            self._overrun = True
-        else:
-            self._waiting += data
-
-    def take(self) -> bytes:
-        data = b"" if self._overrun else bytes(self._waiting)
-        self._waiting.clear()
-        self._overrun = False
-        return data
 
 
 _HANDLERS: Final[Mapping[str, Callable[[Paparazzi, Message], None]]] = {

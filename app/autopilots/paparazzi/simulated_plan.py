@@ -61,10 +61,6 @@ class Block:
     max_height_m: float = float("inf")
     max_distance_m: float = float("inf")
 
-    def is_over(self, time_s: float, height_m: float, distance_m: float) -> bool:
-        """Whether one of its exceptions holds."""
-        return time_s > self.max_time_s or height_m > self.max_height_m or distance_m > self.max_distance_m
-
 
 BLOCKS: Final = (
     Block("Wait GPS", Vertical.THROTTLE, engine=Engine.KILL, after="Geo init", waits=True),
@@ -104,15 +100,11 @@ class FlightPlan:
         self.time_s = 0.0
         """Time since the block was entered, s."""
         self.altitudes_m = dict.fromkeys(WAYPOINTS, DEFAULT_ALTITUDE_M)
+        """Of the waypoints, in the local frame."""
 
     @property
     def block(self) -> Block:
         return BLOCKS[self.seq]
-
-    @property
-    def target_m(self) -> float:
-        """Altitude of the block's waypoint, in the local frame."""
-        return self.altitudes_m[self.block.waypoint]
 
     def enter(self, seq: int, height_m: float) -> None:
         """Enter a block at this height (local frame, up); a number past the end means the last one."""
@@ -131,10 +123,10 @@ class FlightPlan:
             return BY_NAME[block.after]
         if block.landed is not None and not flies and self.time_s > self._landed_after_s:
             return BY_NAME[block.landed]
-        return LAND_HERE if block.is_over(self.time_s, height_m, distance_m) else None
+        is_over = self.time_s > block.max_time_s or height_m > block.max_height_m or distance_m > block.max_distance_m
+        return LAND_HERE if is_over else None
 
 
-NAME_LIMIT: Final = 16
 KILL_SETTING: Final = "kil_thr"
 NEWER_KILL_SETTING: Final = "aut_kil_thr"
 """Name in a source tree of 2017 (version 5.10), in which the variables are in one structure."""
@@ -156,7 +148,7 @@ def settings(kill_setting: str) -> Parameters:
     """Return the settings with their values after the start; `kill_setting` is this release's name of the one that
     stops the throttle, empty if there is none."""
     named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
-    return Parameters([each for each in named if each.name], longest_name=NAME_LIMIT - 1)
+    return Parameters([each for each in named if each.name], longest_name=15)
 
 
 SETTINGS: Final = (

@@ -50,17 +50,22 @@ of the real one without "Geo init" scored 0.272 and 0.283 m in place of 0.325.""
 GROUND_COUNTS: Final = 25
 """Height of the vehicle on the ground above the local origin that "Geo init" sets, 1/256 m (0.098 m)."""
 _GEOID_MM: Final = 49817
-_KILL: Final = 0
-_FAILSAFE: Final = 1
-_GUIDED: Final = 19
-_BY_HAND: Final = 12
+
+# modes
+KILL: Final = 0
+FAILSAFE: Final = 1
+HOME: Final = 2
+BY_HAND: Final = 12
+NAV: Final = 13
+GUIDED: Final = 19
+
 _NO_TEMPERATURE: Final = 32767
 _NOISE_M_S: Final = 1.0 / (1 << SPEED_BITS)
 _NOISE_MS: Final = 20
 """An estimate is never the same twice."""
 
 FALLS_M_S: Final = -2.0
-FIX_S: Final = 0.098
+FIX_TICKS: Final = whole_ticks(0.098)
 """Interval of the position fixes."""
 _STEP_S: Final = 0.08
 """Step of a fix as the time in which it falls as far."""
@@ -152,7 +157,7 @@ class ReportingPaparazzi(SimulatedAutopilot):
 
 def heartbeat(now: ReportingPaparazzi) -> Fields:
     """Return HEARTBEAT; NAV and HOME are equal in it unless it contains the mode's number."""
-    mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8, _BY_HAND: 64 | 16}.get(now.mode, 4)
+    mode = {KILL: 0, FAILSAFE: 0, GUIDED: 8, BY_HAND: 64 | 16}.get(now.mode, 4)
     return {
         "type": 2,
         "autopilot": 9,
@@ -187,7 +192,7 @@ def global_position(now: ReportingPaparazzi) -> Fields:
         "relative_alt": altitude_mm - now.origin_mm // 1000 - 1,
         "vx": 0,
         "vy": 0,
-        "vz": _down_cm_s(now),
+        "vz": round(-now.climb_rate_m_s * 100.0),
         "hdg": 33,
     }
 
@@ -261,10 +266,6 @@ MESSAGES: Final[Mapping[str, Callable[[ReportingPaparazzi], Fields]]] = MappingP
 
 def _stepped(value: float, bits: int) -> float:
     return round(value * (1 << bits)) / (1 << bits)
-
-
-def _down_cm_s(now: ReportingPaparazzi) -> int:
-    return round(-now.climb_rate_m_s * 100.0)
 
 
 def _current(now: ReportingPaparazzi) -> int:

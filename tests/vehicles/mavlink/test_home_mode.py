@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from app.autopilots.dialects import Message, number
-from app.autopilots.paparazzi.simulated import HOME, NAV, Paparazzi
+from app.autopilots.paparazzi.simulated import Paparazzi
+from app.autopilots.paparazzi.simulated_telemetry import HOME, NAV
 from app.autopilots.simulated.body import Body, Make, OutgoingMessage, SimulatedAutopilot
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, VehicleError
 from app.vehicles.mavlink.transports import Peer

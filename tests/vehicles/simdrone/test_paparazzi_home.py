@@ -2,8 +2,9 @@
 
 import pytest
 
-from app.autopilots.paparazzi.simulated import HOME, NAV, Paparazzi
+from app.autopilots.paparazzi.simulated import Paparazzi
 from app.autopilots.paparazzi.simulated_plan import HOME_HEIGHT_M
+from app.autopilots.paparazzi.simulated_telemetry import HOME, NAV
 from app.autopilots.simulated.body import Body
 from tests.simdrone.ground import Ground, flying
 from tests.simdrone.paparazzi import ARMED, LAND, LAND_HERE, Pilot, from_vehicle
