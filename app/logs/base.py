@@ -38,9 +38,9 @@ def contents(stream: BinaryIO) -> Contents:
         return stream.read()
 
 
-def refused(reason: str, hint: str) -> TrajectoryError:
+def refused(reason: str, hint: str, *, field: str = "file") -> TrajectoryError:
     """The error for a file that cannot be read as the expected kind of log."""
-    return TrajectoryError("This file cannot be read as a flight.", hint=hint, problems=(Problem("file", reason),))
+    return TrajectoryError("This file cannot be read as a flight.", hint=hint, problems=(Problem(field, reason),))
 
 
 def numbers(column: NDArray[np.generic]) -> Samples:

@@ -18,6 +18,7 @@ import numpy as np
 from app.core.errors import Problem, TrajectoryError
 from app.core.formatting import count
 from app.core.records.trajectory import CHANNEL_UNITS, Samples, Trajectory
+from app.logs.base import refused
 
 MAX_ROWS: Final = 200_000
 MIN_ROWS: Final = 20
@@ -48,9 +49,14 @@ def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
         columns = _columns(header)
         values, numbers = _read_rows(((reader.line_num, row) for row in reader), header, columns)
     except csv.Error as error:
-        raise _refused(f"line {reader.line_num}", f"is not a line of CSV: {error}", _ROW_HINT) from error
+        raise refused(f"is not a line of CSV: {error}", _ROW_HINT, field=f"line {reader.line_num}") from error
     time_s, *channels = (np.array(column, dtype=np.float64) for column in values)
-    _require_rows(len(time_s))
+    if len(time_s) < MIN_ROWS:
+        raise TrajectoryError(
+            f"The file has {count(len(time_s), 'sample')}; a flight needs at least {MIN_ROWS}.",
+            hint="Upload the whole takeoff, from the command to the end of the scored window.",
+            problems=(Problem("time_s", "has too few rows"),),
+        )
     _require_rising_when_stored(time_s, numbers)
     complete, source = _without_holes(dict(zip(columns[1:], channels, strict=True)), numbers)
     return Trajectory(time_s, complete, source=source, clock="vehicle")
@@ -73,23 +79,23 @@ def _lines(stream: BinaryIO) -> Iterator[str]:
         number += 1
         where = f"line {number}"
         if number > MAX_ROWS + 1:
-            raise _refused(
-                where,
+            raise refused(
                 f"is one too many: a flight may have at most {MAX_ROWS} rows",
                 "Trim the log to the takeoff, or keep every tenth row: 50 rows per second are enough.",
+                field=where,
             )
         if number == 1:
             if raw.startswith(_UTF_16):
-                raise _refused(where, "is text in UTF-16, not UTF-8", _FORMAT_HINT)
+                raise refused("is text in UTF-16, not UTF-8", _FORMAT_HINT, field=where)
             raw = raw.removeprefix(_BYTE_ORDER_MARK)
         if b"\0" in raw:
-            raise _refused(where, "contains bytes that are not text", _FORMAT_HINT)
+            raise refused("contains bytes that are not text", _FORMAT_HINT, field=where)
         if len(raw) > _MAX_LINE_BYTES:
-            raise _refused(where, f"is longer than {_MAX_LINE_BYTES} bytes", _FORMAT_HINT)
+            raise refused(f"is longer than {_MAX_LINE_BYTES} bytes", _FORMAT_HINT, field=where)
         try:
             yield raw.decode("utf-8")
         except UnicodeDecodeError as error:
-            raise _refused(where, f"is not UTF-8 text (byte {error.start + 1})", _FORMAT_HINT) from error
+            raise refused(f"is not UTF-8 text (byte {error.start + 1})", _FORMAT_HINT, field=where) from error
 
 
 def _columns(header: Sequence[str]) -> list[str]:
@@ -98,7 +104,7 @@ def _columns(header: Sequence[str]) -> list[str]:
         raise TrajectoryError("The file is empty.", hint=_FORMAT_HINT, problems=(Problem("line 1", "is missing"),))
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if len(header) == 1 and separator in header[0]:
-            raise _refused("line 1", f"has its columns separated by {name}, not commas", _FORMAT_HINT)
+            raise refused(f"has its columns separated by {name}, not commas", _FORMAT_HINT, field="line 1")
     problems = [Problem(f"line 1, column {name}", "is missing") for name in _REQUIRED if name not in header]
     problems += [
         Problem(f"line 1, column {name}", "appears twice")
@@ -125,15 +131,15 @@ def _read_rows(
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
-            raise _refused(
-                f"line {line}", f"has {len(row)} values where the header names {len(header)} columns", _ROW_HINT
+            raise refused(
+                f"has {len(row)} values where the header names {len(header)} columns", _ROW_HINT, field=f"line {line}"
             )
         numbers_of_row = [_value(row[place], line, name) for place, name in zip(places, columns, strict=True)]
         if numbers_of_row[0] <= last_s:
-            raise _refused(
-                f"line {line}, column time_s",
+            raise refused(
                 f"must increase, but {numbers_of_row[0]:g} s follows {last_s:g} s",
                 _ROW_HINT,
+                field=f"line {line}, column time_s",
             )
         last_s = numbers_of_row[0]
         for column, value in zip(values, numbers_of_row, strict=True):
@@ -150,37 +156,23 @@ def _value(text: str, line: int, column: str) -> float:
     try:
         value = float(text)
     except ValueError as error:
-        raise _refused(where, f"is not a number: {text.strip()[:40]!r}", _ROW_HINT) from error
+        raise refused(f"is not a number: {text.strip()[:40]!r}", _ROW_HINT, field=where) from error
     if not math.isfinite(value) or "_" in text:
-        raise _refused(where, f"is not a finite number: {text.strip()[:40]!r}", _ROW_HINT)
+        raise refused(f"is not a finite number: {text.strip()[:40]!r}", _ROW_HINT, field=where)
     if abs(value) > _LARGEST:
-        raise _refused(
-            where,
+        raise refused(
             f"is outside the range of a takeoff: {value:g}",
             "Count time from the command and use metres and seconds.",
+            field=where,
         )
     return value
 
 
-def _require_rows(rows: int) -> None:
-    if rows < MIN_ROWS:
-        raise TrajectoryError(
-            f"The file has {count(rows, 'sample')}; a flight needs at least {MIN_ROWS}.",
-            hint="Upload the whole takeoff, from the command to the end of the scored window.",
-            problems=(Problem("time_s", "has too few rows"),),
-        )
-
-
 def _require_rising_when_stored(time_s: Samples, numbers: "array[int]") -> None:
     """Trajectories are stored in single precision; time stamps must remain distinct there."""
-    stored = time_s.astype(np.float32)
-    if (late := np.flatnonzero(np.diff(stored) <= 0.0)).size:
-        raise _refused(
-            f"line {numbers[int(late[0]) + 1]}, column time_s",
+    if (late := np.flatnonzero(np.diff(time_s.astype(np.float32)) <= 0.0)).size:
+        raise refused(
             "is too close to the previous line",
             "Count time from the command, and keep at most a few thousand rows per second.",
+            field=f"line {numbers[int(late[0]) + 1]}, column time_s",
         )
-
-
-def _refused(field: str, reason: str, hint: str) -> TrajectoryError:
-    return TrajectoryError("This file cannot be read as a flight.", hint=hint, problems=(Problem(field, reason),))

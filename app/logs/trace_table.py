@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
+from app.logs.formats import head_of
 
 MAX_ROWS: Final = 1_000_000
 MAX_BYTES: Final = 256 * 2**20
@@ -117,10 +118,7 @@ def _unzipped(head: bytes) -> bytes:
 
 def is_zipped(stream: BinaryIO) -> bool:
     """Whether the stream begins as a gzipped file; it is at its beginning afterwards."""
-    stream.seek(0)
-    first = stream.read(len(GZIP))
-    stream.seek(0)
-    return first == GZIP
+    return head_of(stream).startswith(GZIP)
 
 
 @contextmanager
@@ -182,28 +180,24 @@ def read_trace_table(
     """
     hint = f"A trace has # and a JSON object, the columns {','.join(columns)}, and one row of numbers per step."
     checks = TraceChecks(name, hint)
-    try:
-        with text_of(checks, stream, zipped=is_zipped(stream)) as text:
-            return _read(checks, text, columns, frozenset(may_be_empty))
-    except gzip.BadGzipFile as error:
-        raise checks.damaged(error) from error
-
-
-def _read(
-    checks: TraceChecks, text: io.TextIOWrapper, columns: Collection[str], may_be_empty: frozenset[str]
-) -> TraceTable:
-    description = _description(checks, text.readline(_DESCRIPTION_CHARACTERS))
-    reader = csv.reader(text)
-    header = next(reader, [])
-    if missing := tuple(Problem(f"line 2, {each}", "column is missing") for each in columns if each not in header):
-        raise InputError(f"{checks.name} is not a trace of this loop.", hint=checks.hint, problems=missing)
-    if twice := next((each for each in header if header.count(each) > 1), None):
-        raise checks.malformed(f"line 2, {twice}", "column appears twice")
 
     def value(column: str, text: str) -> float:
         return np.nan if not text and column in may_be_empty else _finite(text)
 
-    values = array("d", read_rows(checks, reader, header, value, first_line=_FIRST_ROW))
+    try:
+        with text_of(checks, stream, zipped=is_zipped(stream)) as text:
+            description = _description(checks, text.readline(_DESCRIPTION_CHARACTERS))
+            reader = csv.reader(text)
+            header = next(reader, [])
+            if missing := tuple(
+                Problem(f"line 2, {each}", "column is missing") for each in columns if each not in header
+            ):
+                raise InputError(f"{name} is not a trace of this loop.", hint=hint, problems=missing)
+            if twice := next((each for each in header if header.count(each) > 1), None):
+                raise checks.malformed(f"line 2, {twice}", "column appears twice")
+            values = array("d", read_rows(checks, reader, header, value, first_line=_FIRST_ROW))
+    except gzip.BadGzipFile as error:
+        raise checks.damaged(error) from error
     table = np.array(values).reshape(-1, len(header))
     return TraceTable(description, {each: np.ascontiguousarray(table[:, k]) for k, each in enumerate(header)})
 

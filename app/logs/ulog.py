@@ -13,8 +13,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.core.formatting import count, times
-from app.core.records.trajectory import Samples
-from app.logs.base import Contents, Table, contents, numbers, refused
+from app.logs.base import Contents, Table, contents, refused
 
 _MAGIC: Final = b"ULog\x01\x12\x35"
 _HEADER_BYTES: Final = 16
@@ -73,14 +72,9 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], parameters: C
     )
 
 
-def seconds(table: Table) -> Samples:
-    """Time of each row since the vehicle started, s."""
-    return numbers(table["timestamp"]) / 1e6
-
-
-def has_rows(table: Table, *names: str) -> bool:
-    """Whether a topic was logged, with these columns."""
-    return {"timestamp", *names} <= table.keys() and len(table["timestamp"]) > 0
+def has_rows(table: Table) -> bool:
+    """Whether a topic was logged."""
+    return "timestamp" in table and len(table["timestamp"]) > 0
 
 
 @dataclass(slots=True)
@@ -119,18 +113,19 @@ class _LogFilter:
         self.is_cut_off = position < size
 
     def _is_wanted(self, kind: int, data: Contents, start: int, end: int) -> bool:
-        if kind == ord("D"):
-            return end - start > 2 and (data[start] | data[start + 1] << 8) in self._subscribed
-        if kind == ord("O"):
-            return end - start == 2
-        if kind == ord("F"):
-            return self._takes_format(data[start:end])
-        if kind == ord("A"):
-            return self._subscribes(data[start:end])
-        if kind == ord("P"):
-            return self._is_parameter(data[start:end])
-        if kind == ord("B"):
-            self._flags(data[start:end])
+        match chr(kind):
+            case "D":
+                return end - start > 2 and (data[start] | data[start + 1] << 8) in self._subscribed
+            case "O":
+                return end - start == 2
+            case "F":
+                return self._takes_format(data[start:end])
+            case "A":
+                return self._subscribes(data[start:end])
+            case "P":
+                return self._is_parameter(data[start:end])
+            case "B":
+                self._flags(data[start:end])
         return False
 
     def _takes_format(self, body: bytes) -> bool:
