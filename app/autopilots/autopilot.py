@@ -1,29 +1,85 @@
-"""What is known of one autopilot: gains, modes, requirements, how its messages are read, and what is sent to it."""
+"""What is known of one autopilot: gains on board and which values may be written, modes, requirements, how its messages
+are read, and what is sent to it."""
 
 import math
-from collections.abc import Callable, Mapping
+import struct
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from types import MappingProxyType
+from typing import Literal
 
 from app.autopilots import commands, mavlink
 from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
 from app.autopilots.dialects import Dialect, Message
-from app.autopilots.gains import GainSet
 from app.autopilots.measurements import Measurement, VehicleEvent
 from app.autopilots.simulated.body import SimulatedKind
-from app.core.errors import GainlineError
+from app.core.errors import GainlineError, GainsError, Problem
 from app.core.experiments.base import Experiment
+from app.core.policy import Gain, Gains, shortened
 
 ReferenceSource = Literal["replica", "error", "target"]
 """Source of an autopilot's own reference: the replica of its loop computes it; it sends its altitude error; it is the
 position target, which it sends."""
 
-AUTOPILOT: Final = 1
-"""Default component id of autopilots."""
-
 
 class AutopilotError(GainlineError):
     """A vehicle cannot be flown by what is known of its autopilot."""
+
+
+@dataclass(frozen=True, slots=True)
+class GainParameter:
+    """A gain by its name here and on the vehicle, the range of values that may be written (autopilots accept any), and
+    the `factor` from the gain to the vehicle's value. `whole`: the vehicle keeps only the integer part. `integrates`:
+    writing it may clear an integrator, so it is sent last in flight."""
+
+    gain: str
+    parameter: str
+    lower: float
+    upper: float
+    factor: float = 1.0
+    whole: bool = False
+    integrates: bool = False
+
+    def sent(self, value: float) -> float:
+        """Return the value to send, in single precision."""
+        sent = value * self.factor
+        return float(struct.unpack("<f", struct.pack("<f", sent))[0]) if math.isfinite(sent) else sent
+
+    def read(self, wire: float, requested: float | None = None) -> float:
+        """Return the gain for a value of the vehicle, to the seven digits of single precision; exactly `requested` if
+        the value is the one sent for it."""
+        if self.whole:
+            return int(wire)
+        return (
+            requested if requested is not None and wire == self.sent(requested) else float(f"{wire / self.factor:.7g}")
+        )
+
+    def logged(self, value: float) -> float:
+        """Return the gain for a value in a log: as it is there, or if it has a factor to seven digits."""
+        return value if self.factor == 1.0 else self.read(value)
+
+    def refusal(self, value: float) -> str | None:
+        """Return why this value may not be written, or None if it may."""
+        if not self.lower <= value <= self.upper:
+            return f"must be between {self.lower:g} and {self.upper:g}, got {shortened(value)}"
+        return f"must be a whole number of counts, got {value:g}" if self.whole and value != int(value) else None
+
+
+GainSet = tuple[GainParameter, ...]
+
+
+def on_board(
+    gains: Sequence[Gain], *, integrating: str, names: Mapping[str, tuple[str, float]] = MappingProxyType({})
+) -> GainSet:
+    """Return the gains of an experiment, with its ranges, as parameters of a release. `names`: those that have another
+    name on board, and the factor to their value there. `integrating`: the one that clears an integrator."""
+    return tuple(
+        GainParameter(
+            gain.name, parameter, gain.lower, gain.upper, factor, gain.integer, integrates=gain.name == integrating
+        )
+        for gain in gains
+        for parameter, factor in (names.get(gain.name, (gain.name, 1.0)),)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +223,9 @@ class Autopilot:
     """Whether recordings have the gains by their names here, rather than by those of the releases."""
     sends_integers_bytewise: bool = False
     """Whether the value of an integer parameter is its four bytes, in place of a float."""
-    parameter_component: int = AUTOPILOT
-    """Component that a PARAM_SET names. Some vehicles, such as MAVSDK's, ignore one to all components (0)."""
+    parameter_component: int = 1
+    """Component that a PARAM_SET names, by default that of autopilots. Some vehicles, such as MAVSDK's, ignore one to
+    all components (0)."""
     loop_parameters: tuple[tuple[str, ...], ...] = ()
     """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set points.
     None if the replica of its loop has no parameters but its gains."""
@@ -252,3 +309,25 @@ class Autopilot:
     def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
         """Return the message that sets a floating-point parameter, the type of all gains."""
         return commands.set_parameter(target, parameter, value, component=self.parameter_component)
+
+
+def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
+    """Return the gains, complete and in order. Raises GainsError for those that may not be written, because autopilots
+    do not check."""
+    refusals = {gain.gain: gain.refusal for gain in gain_set}
+    require_accepted(gains, refusals, "These gains may not be written to the vehicle.", ", each within its range")
+    return {gain.gain: int(gains[gain.gain]) if gain.whole else float(gains[gain.gain]) for gain in gain_set}
+
+
+def require_accepted(
+    gains: Gains, refusals: Mapping[str, Callable[[float], str | None]], happened: str, needed: str
+) -> None:
+    """Raise GainsError that names every unknown or missing gain, and each whose value has a refusal by its name;
+    `needed` ends the sentence that asks for accepted values."""
+    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in refusals]
+    for name, refusal in refusals.items():
+        reason = refusal(gains[name]) if name in gains else "is missing"
+        if reason is not None:
+            problems.append(Problem(f"gains.{name}", reason))
+    if problems:
+        raise GainsError(happened, problems=tuple(problems), hint=f"Send {', '.join(refusals)}{needed}.")

@@ -186,7 +186,6 @@ class Codec:
         self._out = library.MAVLink(None, srcSystem=system, srcComponent=component)
         self._in = library.MAVLink(None)
         self._in.robust_parsing = True
-        self._signs = signing_key is not None
         if signing_key is not None:
             _check_key(signing_key)
             for state in (self._out.signing, self._in.signing):  # both sign, and accept only what is signed
@@ -198,8 +197,8 @@ class Codec:
         """Return the frame of `message` (of `Dialect.message`), with the next sequence number, signed if there is a
         key: with the time, or the latest one seen from the other end if that is ahead, for times must not go back or
         repeat."""
-        if self._signs:
-            out = self._out.signing
+        out = self._out.signing
+        if out.sign_outgoing:
             out.timestamp = max(out.timestamp, self._in.signing.timestamp, signing_time())
         packable: _Packable = message  # type: ignore[assignment]  # every message of the library has `pack`
         frame = packable.pack(self._out)

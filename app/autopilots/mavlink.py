@@ -154,17 +154,12 @@ def landed_state(message: Message) -> LandedState | None:
 
 def version(message: Message) -> Version | None:
     """Read AUTOPILOT_VERSION: major, minor and patch in one byte each, and the hardware id, preferably the newer and
-    longer `uid2`; None if it has neither."""
+    longer `uid2`, in hexadecimal digits; None if it has neither."""
     packed = int(number(message, "flight_sw_version"))
     release = f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}" if packed else ""
-    uid = _hardware_id(message)
-    return Version(release, uid) if release or uid else None
-
-
-def _hardware_id(message: Message) -> str:
-    """Return the hardware id in hexadecimal digits; empty if not reported. Raises AttributeError as `number` does."""
     short, long = getattr(message, "uid"), bytes(getattr(message, "uid2"))  # noqa: B009 - the library has no types
-    return long.hex() if any(long) else f"{short:016x}" if short else ""
+    uid = long.hex() if any(long) else f"{short:016x}" if short else ""
+    return Version(release, uid) if release or uid else None
 
 
 def bytewise_integer(value: float) -> int:

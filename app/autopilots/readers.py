@@ -24,8 +24,6 @@ from app.logs.formats import Format, head_of, recognise
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.logs.ulog import HINT as ULOG_HINT
 
-_COMPANION: Final = ".log"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
@@ -101,7 +99,7 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     if (reader := reader_of(head)) is not None:
         return reader.takeoffs(reader.read(stream, companion))
     suffix = PurePath(name).suffix.lower()
-    if suffix == _COMPANION:
+    if suffix == ".log":
         raise TrajectoryError(
             f"{PurePath(name).name[:80]} contains no flight.",
             hint="A .log file goes with Paparazzi's .data file of the same name: choose both.",

@@ -16,8 +16,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.autopilots.autopilot import Autopilot
-from app.autopilots.gains import GainParameter
+from app.autopilots.autopilot import Autopilot, GainParameter
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
     Event,

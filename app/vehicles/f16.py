@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.gains import require_accepted
+from app.autopilots.autopilot import require_accepted
 from app.core.definition import Option
 from app.core.experiments.pitch_tracking import DETAIL_CHANNELS, OUTPUT, WINDOW_S, PitchTracking, named_channels
 from app.core.models.f16 import (

@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from app.autopilots.autopilot import Autopilot
-from app.autopilots.gains import check_gains
+from app.autopilots.autopilot import Autopilot, check_gains
 from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import ScaledClock
 from app.core.definition import Option

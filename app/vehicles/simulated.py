@@ -10,7 +10,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from app.autopilots.gains import require_accepted
+from app.autopilots.autopilot import require_accepted
 from app.core.clock import REAL_TIME, Clock
 from app.core.control.vertical_guidance import (
     ALT,

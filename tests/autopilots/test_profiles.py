@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from app.autopilots.autopilot import Autopilot, AutopilotError
+from app.autopilots.autopilot import Autopilot, AutopilotError, check_gains
 from app.autopilots.commands import Action, Outgoing, Setting, Target
 from app.autopilots.dialects import FieldValue, Message, number, text
-from app.autopilots.gains import check_gains
 from app.autopilots.measurements import (
     Battery,
     Block,

@@ -6,10 +6,9 @@ from typing import Final
 from app.autopilots import commands, mavlink
 from app.autopilots.ardupilot.experiments import EXPERIMENTS, GAINS
 from app.autopilots.ardupilot.replica.parameters import LOOP_NAMES, NEWER_NAMES, SINCE_4_7, UNSUPPORTED
-from app.autopilots.autopilot import Autopilot, Requirement
+from app.autopilots.autopilot import Autopilot, Requirement, on_board
 from app.autopilots.commands import Action, Setting, Step, Target
 from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
-from app.autopilots.gains import on_board
 from app.autopilots.measurements import Measurement
 from app.autopilots.simulated.body import SimulatedKind
 

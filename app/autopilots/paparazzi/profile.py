@@ -6,11 +6,10 @@ from types import MappingProxyType
 from typing import Final
 
 from app.autopilots import commands, mavlink
-from app.autopilots.autopilot import Autopilot, AutopilotError, ModeParameter
+from app.autopilots.autopilot import Autopilot, AutopilotError, GainParameter, ModeParameter
 from app.autopilots.commands import Action, Ask, Outgoing, Step, Target
 from app.autopilots.dialects import PAPARAZZI as DIALECT
 from app.autopilots.dialects import Message, number, text
-from app.autopilots.gains import GainParameter
 from app.autopilots.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.experiments.altitude_steps import AltitudeSteps
@@ -42,14 +41,12 @@ _HOME_NUMBER: Final = 2
 
 def _explore(ask: Ask, target: Target) -> Mapping[str, int]:
     """Request the list of blocks once; the acknowledgement that ends it is sent before every change of block."""
-    request = Outgoing("SCRIPT_REQUEST_LIST", _to(target))
-    counted = ask(request, lambda reply: isinstance(reply, BlockCount))
+    counted = ask(Outgoing("SCRIPT_REQUEST_LIST", _to(target)), lambda reply: isinstance(reply, BlockCount))
     if not isinstance(counted, BlockCount):
         raise _without_blocks("It did not list the blocks of its flight plan.")
     blocks: dict[str, int] = {}
     for seq in range(counted.count):
-        request = Outgoing("SCRIPT_REQUEST", _to(target) | {"seq": seq})
-        found = ask(request, partial(_is_block, seq))
+        found = ask(Outgoing("SCRIPT_REQUEST", _to(target) | {"seq": seq}), partial(_is_block, seq))
         if not isinstance(found, Block):
             raise _without_blocks(f"It did not name block {seq} of {counted.count}.")
         blocks.setdefault(found.name, found.number)
@@ -64,7 +61,7 @@ def _is_block(number: int, reply: Measurement) -> bool:
 
 def _conclude(target: Target) -> tuple[Outgoing, ...]:
     """Return the end of the listing of blocks, which otherwise prevents every change of block for 15 s."""
-    return (_acknowledge(target),)
+    return (Outgoing("MISSION_ACK", _to(target) | {"type": 0}),)
 
 
 def _refer_to_ground(target: Target) -> tuple[Step, ...]:
@@ -100,13 +97,9 @@ def _to(target: Target) -> dict[str, float]:
     return {"target_system": target.system, "target_component": 0}
 
 
-def _acknowledge(target: Target) -> Outgoing:
-    return Outgoing("MISSION_ACK", _to(target) | {"type": 0})
-
-
 def _block(target: Target, name: str) -> tuple[Outgoing, ...]:
     activate = Outgoing("SCRIPT_ITEM", {**_to(target), "seq": target.blocks[name], "name": ""})
-    return (_acknowledge(target), activate)
+    return (*_conclude(target), activate)
 
 
 def _climb_here(target: Target) -> Outgoing:

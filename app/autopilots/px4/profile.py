@@ -6,10 +6,9 @@ from types import MappingProxyType
 from typing import Final
 
 from app.autopilots import commands, mavlink
-from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, HoverLimits, Requirement
+from app.autopilots.autopilot import Autopilot, AutopilotError, ChecksRequest, HoverLimits, Requirement, on_board
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
-from app.autopilots.gains import on_board
 from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Final
 
 from app.autopilots import commands
+from app.autopilots.autopilot import GainParameter, GainSet, check_gains
 from app.autopilots.commands import Outgoing, Setting
-from app.autopilots.gains import GainParameter, GainSet, check_gains
 from app.autopilots.measurements import Measurement, Parameter
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch

@@ -3,10 +3,9 @@
 from typing import Final
 
 from app.autopilots import commands, mavlink
-from app.autopilots.autopilot import Autopilot
+from app.autopilots.autopilot import Autopilot, GainParameter
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
-from app.autopilots.gains import GainParameter
 from app.autopilots.measurements import Measurement
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.experiments.takeoff import Takeoff
