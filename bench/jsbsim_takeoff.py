@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.vehicles.base import FlightOptions, Vehicle
 from app.vehicles.jsbsim import new_aircraft
 from app.vehicles.registry import open_vehicle

@@ -1,15 +1,70 @@
-"""Registry of the autopilots."""
+"""Registries of the autopilots and of the experiments: those of the autopilots, and one without any."""
 
 from collections.abc import Mapping
+from functools import lru_cache
+from itertools import chain, zip_longest
 from types import MappingProxyType
 from typing import Final
+
+import numpy as np
 
 from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.autopilot import Autopilot
 from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.autopilots.px4.profile import PX4
+from app.core.definition import Definition, OptionValue
+from app.core.errors import InputError, Problem
+from app.core.experiments.base import Experiment
+from app.core.experiments.pitch_tracking import PitchTracking
+from app.core.policy import PolicySpace
 
 AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType(
     {autopilot.name: autopilot for autopilot in (PAPARAZZI, ARDUPILOT, PX4)}
 )
 """The default first."""
+
+_DEFAULT, *_OTHERS = (autopilot.experiments for autopilot in AUTOPILOTS.values())
+
+EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType(
+    {
+        experiment.name: experiment
+        for experiment in (*_DEFAULT, *chain(*zip_longest(*_OTHERS)), PitchTracking())
+        if experiment is not None
+    }
+)
+"""Those of the default autopilot first, then the others' by rank."""
+
+
+def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) -> Experiment:
+    """Return an experiment with its settings, which must be free of problems; the same object for the same settings.
+
+    Raises InputError for an unknown name.
+    """
+    if name not in EXPERIMENTS:
+        raise InputError(
+            "Unknown experiment.",
+            hint=f"Choose one of: {', '.join(EXPERIMENTS)}.",
+            problems=(Problem("experiment", f"unknown name {name!r}"),),
+        )
+    return _configured(name, tuple(sorted(options.items()))) if options else EXPERIMENTS[name]
+
+
+@lru_cache
+def _configured(name: str, options: tuple[tuple[str, OptionValue], ...]) -> Experiment:
+    return EXPERIMENTS[name].configured(dict(options))
+
+
+def experiment_of(definition: Definition) -> Experiment:
+    """Return the experiment of a definition, configured as defined there; with the vehicle and the autopilot's
+    parameters of the log that it starts from, if it does."""
+    experiment = get_experiment(definition.experiment, definition.experiment_options)
+    log, modelled = definition.start.log, experiment.modelled
+    if log is None or modelled is None:
+        return experiment
+    mean, deviation = np.array([log.vehicle[each.name] for each in modelled.model_parameters]).T
+    return modelled.informed(mean, deviation).under(log.parameters)
+
+
+def space_of(definition: Definition) -> PolicySpace:
+    """The policy space of a campaign, within its bounds."""
+    return experiment_of(definition).space.narrowed(definition.bounds)

@@ -7,7 +7,7 @@ from typing import Final
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.bundles.contents import CONTENTS, Campaign, Proposal, Record, Trial
 from app.bundles.reader import Bundle, trajectory_row
 from app.campaigns import history

@@ -18,7 +18,7 @@ import numpy as np
 import zstandard
 from pydantic import BaseModel, ValidationError
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Photo, Record
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field, ValidationError
 
-from app.autopilots.experiments import EXPERIMENTS, experiment_of, get_experiment
+from app.autopilots.registry import EXPERIMENTS, experiment_of, get_experiment
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
 from app.common.errors import InputError, NotFoundError, Problem

@@ -8,8 +8,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from app import __version__
-from app.autopilots.experiments import EXPERIMENTS
-from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.registry import AUTOPILOTS, EXPERIMENTS
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import ParameterDistribution
 from app.core.experiments.takeoff import Takeoff

@@ -11,7 +11,7 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import EXPERIMENTS, experiment_of, get_experiment
+from app.autopilots.registry import EXPERIMENTS, experiment_of, get_experiment
 from app.campaigns import history, repository
 from app.campaigns.schemas import Definition as DefinitionIn
 from app.campaigns.schemas import Donor, Start

@@ -9,7 +9,7 @@ from typing import Final, Literal, cast
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale

@@ -9,7 +9,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import experiment_of, space_of
+from app.autopilots.registry import experiment_of, space_of
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.proposals import read_donor

@@ -12,7 +12,7 @@ import numpy as np
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import repository
 from app.common.conflict_checks import check_transition
 from app.common.errors import NotFoundError, StorageError

@@ -10,7 +10,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of, frozen_digest

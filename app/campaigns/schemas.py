@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.common.schemas import (
     Gains,
     Gate,

@@ -13,7 +13,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.campaigns import history, repository
 from app.campaigns.definitions import check_campaign, fill_in_donor, stored
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state

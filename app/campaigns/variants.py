@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import space_of
+from app.autopilots.registry import space_of
 from app.campaigns import history, proposals
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import ChoiceKind, Variant

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 from app.accounts.permissions import LOCAL_CLI
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import history, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.campaign_files import CampaignFile, gains_by_hand

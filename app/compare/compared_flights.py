@@ -9,7 +9,7 @@ from typing import Final
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import experiment_of, get_experiment
+from app.autopilots.registry import experiment_of, get_experiment
 from app.campaigns import history
 from app.campaigns import service as campaigns_service
 from app.campaigns.definitions import definition_of

@@ -10,7 +10,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext, require
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.core.analysis.analysis import Analysis
 from app.core.definition import LogEvidence
 from app.core.errors import Problem, TrajectoryError

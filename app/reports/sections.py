@@ -9,7 +9,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.campaigns.history import FLOWN
 from app.campaigns.schemas import Campaign, Start, StopRule
 from app.campaigns.statistics import CampaignStatistics

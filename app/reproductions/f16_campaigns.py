@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule, flight_seed
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.policy import Vector

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.definition import Definition
 from app.core.experiments.base import prior_distribution
 from app.core.formatting import percent

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.definition import flight_seed
 from app.core.experiments.base import Matrix, Scatter
 from app.core.formatting import number, short_percent

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot.replica.parameters import DEFAULTS, STEP_S, parameters_from
-from app.autopilots.experiments import get_experiment
 from app.autopilots.px4.replica import parameters as px4_parameters
+from app.autopilots.registry import get_experiment
 from app.core.experiments.copter_steps import CopterSteps
 from app.core.models.set_points import SetPoints
 from app.core.records.trajectory import Samples, Trajectory

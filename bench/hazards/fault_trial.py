@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.flight_end import Failure
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

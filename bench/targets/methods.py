@@ -17,7 +17,7 @@ from unittest.mock import patch
 import numpy as np
 from scipy.optimize import minimize
 
-from app.autopilots.experiments import EXPERIMENTS, experiment_of
+from app.autopilots.registry import EXPERIMENTS, experiment_of
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector

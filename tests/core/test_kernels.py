@@ -73,7 +73,7 @@ def test_each_state_of_the_sources_has_its_own_folder(tmp_path: Path, monkeypatc
 
 NUMBA_FREE = """
 import sys
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 assert "numba" not in sys.modules
 """
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.common.data_folder import vehicle_lock
 from app.flights.flight_loop import FlightMonitor
 from app.flights.flight_process import FlightProcess, FlightProcessPool

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.campaigns.schemas import Definition, Sort
 from app.common.states import CampaignState, JobState, Outcome, TrialState, VehicleState
 from app.core.records.trajectory import CHANNEL_UNITS

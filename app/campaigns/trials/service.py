@@ -12,7 +12,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of

@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 from sqlalchemy.orm import Session
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.campaigns import history
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of

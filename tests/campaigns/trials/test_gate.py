@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.campaigns import computation, proposals
 from app.core.experiments.base import prior_distribution
 from app.core.records.trajectory import Trajectory

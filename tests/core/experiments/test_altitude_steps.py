@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.definition import Definition, Flight, OptionValue
 from app.core.errors import TrajectoryError
 from app.core.experiments.altitude_steps import AltitudeSteps

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.experiments import ArduPilotSteps
-from app.autopilots.experiments import get_experiment
 from app.autopilots.px4.experiments import Px4Steps
+from app.autopilots.registry import get_experiment
 from app.core.definition import Definition, Flight, OptionValue, Start
 from app.core.errors import InputError
 from app.core.experiments.base import Check, Envelope, prior_distribution

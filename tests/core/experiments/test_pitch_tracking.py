@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Envelope, prior_distribution
 from app.core.experiments.pitch_tracking import PitchTracking

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import EXPERIMENTS, get_experiment
+from app.autopilots.registry import EXPERIMENTS, get_experiment
 from app.core.definition import Definition
 from app.core.errors import InputError, TrajectoryError
 from app.core.experiments.base import Envelope, prior_distribution

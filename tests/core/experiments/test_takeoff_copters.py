@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains

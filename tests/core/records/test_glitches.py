@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.trajectory import Samples, Trajectory

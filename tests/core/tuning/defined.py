@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.autopilots.experiments import EXPERIMENTS, experiment_of
+from app.autopilots.registry import EXPERIMENTS, experiment_of
 from app.core.definition import Definition, Flight
 from app.core.errors import Problem
 from app.core.experiments.base import ModelledExperiment

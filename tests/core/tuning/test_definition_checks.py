@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.core.definition import Definition, Donor, Start, StopRule
 from app.core.errors import InputError
 from tests.core.tuning.defined import check_definition, problems_of

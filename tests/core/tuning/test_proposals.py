@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.autopilots.experiments import experiment_of
+from app.autopilots.registry import experiment_of
 from app.core.definition import Definition, Flight, Start, StopRule
 from app.core.tuning.gate import check_policy
 from app.core.tuning.proposals import advise

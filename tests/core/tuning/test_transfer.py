@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.campaign_models import as_flown

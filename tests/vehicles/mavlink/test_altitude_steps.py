@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.dialects import number
-from app.autopilots.experiments import get_experiment
+from app.autopilots.registry import get_experiment
 from app.autopilots.simulated.copter_parameters import Parameters
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints

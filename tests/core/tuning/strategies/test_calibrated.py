@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.core.definition import Definition, Flight, Prediction, StopRule
 from app.core.formatting import short
 from app.core.records.trajectory import Trajectory

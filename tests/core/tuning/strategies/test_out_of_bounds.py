@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.core.definition import Definition
 from app.core.tuning.strategies import STRATEGIES
 from tests.core.tuning.defined import evidence, next_proposal

@@ -1,6 +1,6 @@
 import pytest
 
-from app.autopilots.experiments import EXPERIMENTS
+from app.autopilots.registry import EXPERIMENTS
 from app.core.tuning.strategies import recommended_strategy
 
 
