@@ -7,10 +7,9 @@ from typing import Any, ClassVar, Final
 from app.core import formatting
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.data import AnyFlight, FlightData, History, Range, last_number
+from app.figures.data import AnyFlight, FlightData, History, Range
 from app.figures.overlays import MANY, off_scale_traces
 from app.figures.scale import RobustRange, robust_range
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 FEW: Final = 8
 """Up to this number of flights, every error is labelled."""
@@ -31,7 +30,7 @@ class ErrorsFigure:
     """
 
     history: History
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "errors"
     title: ClassVar[str] = "Error per flight"
 
@@ -45,8 +44,8 @@ class ErrorsFigure:
         return "The error of each flight appears here after the first valid flight."
 
     def compute(self) -> Card:
-        palette, history = PALETTES[self.theme], self.history
-        last, span, strip = last_number(history), self._span(), self._strip(palette)
+        palette, history = theme.PALETTES[self.theme_name], self.history
+        last, span, strip = history.last_number, self._span(), self._strip(palette)
         traces = [
             *self._noise(palette, last),
             self._best_so_far(palette),
@@ -82,7 +81,7 @@ class ErrorsFigure:
         )
         return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _strip(self, palette: Palette) -> dict[str, object]:
+    def _strip(self, palette: theme.Palette) -> dict[str, object]:
         """The ordinate of the strip below the errors; empty if every flight has an error."""
         if all(flight.error is not None for flight in self.history.flights):
             return {}
@@ -106,7 +105,7 @@ class ErrorsFigure:
         high = max(first, default=min(errors))
         return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
 
-    def _measured(self, palette: Palette) -> Iterator[Trace]:
+    def _measured(self, palette: theme.Palette) -> Iterator[Trace]:
         flights, best = self.history.valid, self.history.best
         if not flights:
             return
@@ -136,7 +135,7 @@ class ErrorsFigure:
         noise = self.history.noise
         return "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
 
-    def _error_bars(self, palette: Palette) -> dict[str, Any]:
+    def _error_bars(self, palette: theme.Palette) -> dict[str, Any]:
         """One standard deviation of a single flight, up and down."""
         noise = self.history.noise
         if noise is None or self._is_crowded:
@@ -144,7 +143,7 @@ class ErrorsFigure:
         bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
         return {"error_y": bar}
 
-    def _noise(self, palette: Palette, last: int) -> Iterator[Trace]:
+    def _noise(self, palette: theme.Palette, last: int) -> Iterator[Trace]:
         """Range in which another flight of the best gains would lie: a result inside it is not significant."""
         noise = self.history.noise
         if noise is None or noise.around_best is None:
@@ -160,7 +159,7 @@ class ErrorsFigure:
             fillcolor=theme.with_opacity(palette.best, 0.12),
         )
 
-    def _repeats(self, palette: Palette) -> Iterator[Trace]:
+    def _repeats(self, palette: theme.Palette) -> Iterator[Trace]:
         """Mean of flights with the same gains, with its standard error, beside the last of them."""
         repeats = () if self.history.noise is None else self.history.noise.repeats
         if not repeats:
@@ -188,7 +187,7 @@ class ErrorsFigure:
             hovertemplate="<b>%{text}</b><extra></extra>",
         )
 
-    def _intervals(self, palette: Palette, top: float) -> Iterator[Trace]:
+    def _intervals(self, palette: theme.Palette, top: float) -> Iterator[Trace]:
         """Predicted interval of each flight's error, or only the next one's if there are many.
 
         A bar behind the diamond of the prediction, cut at the edge.
@@ -225,7 +224,7 @@ class ErrorsFigure:
     def _expected(self) -> list[tuple[int, Range]]:
         return [(each.number, each.interval) for each in self._predicted_flights() if each.interval is not None]
 
-    def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
+    def _labels(self, palette: theme.Palette, top: float) -> list[dict[str, object]]:
         """The error beside each mark, clear of the steps; with many flights only the best."""
         flights, best = self.history.valid, self.history.best
         return [
@@ -242,7 +241,7 @@ class ErrorsFigure:
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _not_valid(self, palette: Palette) -> list[Trace]:
+    def _not_valid(self, palette: theme.Palette) -> list[Trace]:
         """Marks for flights that do not count and those without a review: at their error, or in the strip."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet reviewed"}]
@@ -282,7 +281,7 @@ class ErrorsFigure:
             if placed
         ]
 
-    def _best_so_far(self, palette: Palette) -> Trace:
+    def _best_so_far(self, palette: theme.Palette) -> Trace:
         best = best_so_far(self.history)
         numbers = [flight.number for flight in self.history.valid]
         return scatter(
@@ -292,7 +291,7 @@ class ErrorsFigure:
             line={**theme.line(palette.best, 2), "shape": "hv"},
         )
 
-    def _threshold(self, palette: Palette, last: int) -> Iterator[Trace]:
+    def _threshold(self, palette: theme.Palette, last: int) -> Iterator[Trace]:
         """The error below which the stop rule counts a further flight as an improvement."""
         best, improvement = self.history.best, self.history.stop_improvement
         if best is None or best.error is None or improvement is None:
@@ -305,7 +304,7 @@ class ErrorsFigure:
             line=theme.line(palette.dim, 1.25, "dot"),
         )
 
-    def _predicted(self, palette: Palette, top: float) -> Iterator[Trace]:
+    def _predicted(self, palette: theme.Palette, top: float) -> Iterator[Trace]:
         """The predicted error of each flight, or only the next one's if there are many: a diamond, or where it is off
         the scale, a triangle at the edge."""
         known = self._predictions()

@@ -14,14 +14,13 @@ from app.figures import theme
 from app.figures.base import Trace, reading, scatter
 from app.figures.data import Band, Curve, FlightData, History, Range
 from app.figures.scale import thin_by_bends, thinned
-from app.figures.theme import Palette
 
 GLITCH_POINTS: Final = 60
 Side = Literal["left", "center", "right"]
 """Where a label is, seen from its mark."""
 
 
-def band_traces(palette: Palette, band: Band | None) -> Iterator[Trace]:
+def band_traces(palette: theme.Palette, band: Band | None) -> Iterator[Trace]:
     """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
     if band is None:
         return
@@ -37,7 +36,7 @@ def band_traces(palette: Palette, band: Band | None) -> Iterator[Trace]:
 
 
 def glitch_traces(
-    palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+    palette: theme.Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
 ) -> Iterator[Trace]:
     """The glitches of a flight's record, over its curve: one trace, or none."""
     if curve is None or not glitches:
@@ -67,7 +66,7 @@ PRINT: Final = 0.18
 
 
 def off_scale_traces(
-    palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
+    palette: theme.Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
 ) -> list[Trace]:
     """Marks at height `top` of an axis that ends with flight `last`.
 
@@ -88,7 +87,7 @@ def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
             yield number
 
 
-def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
+def _alone(palette: theme.Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
     text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
     return scatter(
         text,
@@ -106,7 +105,7 @@ def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_pr
     )
 
 
-def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> Trace:
+def _together(palette: theme.Palette, flights: Sequence[FlightData], top: float, unit: str) -> Trace:
     """Many flights in one trace, without printed errors."""
     return scatter(
         "Off scale",
@@ -233,7 +232,7 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
     return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
 
 
-def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> Iterator[Trace]:
+def envelope_traces(palette: theme.Palette, envelope: Envelope | None, unit: str) -> Iterator[Trace]:
     """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
     if envelope is None:
         return

@@ -11,7 +11,6 @@ import numpy as np
 from app.core.records.overlaid import Overlaid
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 Style = Literal[
     "goal", "reference", "measured", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
@@ -67,7 +66,7 @@ class PanelsFigure:
     """
 
     plot: Plot
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "panels"
 
     @property
@@ -78,7 +77,7 @@ class PanelsFigure:
         return None if any(panel.lines for panel in self.plot.panels) else "Nothing to draw."
 
     def compute(self) -> Card:
-        palette, plot = PALETTES[self.theme], self.plot
+        palette, plot = theme.PALETTES[self.theme_name], self.plot
         axes: dict[str, object] = {}
         traces: list[Trace] = []
         named: set[str] = set()
@@ -90,7 +89,7 @@ class PanelsFigure:
         layout = theme.layout(palette, uirevision=plot.title, showlegend=len(named) > 1, **axes)
         return ready(self, traces, layout, summary=plot.summary, table=self._table())
 
-    def _trace(self, palette: Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
+    def _trace(self, palette: theme.Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
         colour, width, dash = _pen(palette, line.style)
         drawn: dict[str, object] = (
             {"mode": "markers", "marker": theme.solid(colour, size=7), "cliponaxis": False}
@@ -109,7 +108,7 @@ class PanelsFigure:
         )
         return trace | theme.on(number) | drawn
 
-    def _axes(self, palette: Palette, number: int, panel: Panel) -> dict[str, object]:
+    def _axes(self, palette: theme.Palette, number: int, panel: Panel) -> dict[str, object]:
         count = len(self.plot.panels)
         x = {} if self.plot.x_range is None else {"range": list(self.plot.x_range)}
         y = {} if panel.y_range is None else {"range": list(panel.y_range)}
@@ -149,7 +148,7 @@ def _at(line: Line, x: float, digits: int) -> Cell:
     return round(float(np.interp(x, line.x, line.y)), digits)
 
 
-def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
+def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
     """Colour, width and dash."""
     _, orange, blue = palette.gains
     pens: dict[Style, tuple[str, float, str]] = {
