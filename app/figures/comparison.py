@@ -65,11 +65,26 @@ class ComparisonFigure:
         traces += [
             self._difference(palette, index, flight, curve) for index, flight, curve in self._differences(recorded)
         ]
-        for _, flight, curve in [recorded[place] for place in outside]:
-            label, unit = flight.label, self.data.output_unit
-            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.trial_id, text=label, unit=unit))
-        layout = self._layout(palette, low, high)
-        return ready(self, traces, layout, summary=self._summary(len(outside)), table=self._table(recorded))
+        traces += [
+            off_scale(
+                flight.label,
+                curve,
+                low,
+                high,
+                palette.bad,
+                trial=flight.trial_id,
+                text=flight.label,
+                unit=self.data.output_unit,
+            )
+            for _, flight, curve in (recorded[place] for place in outside)
+        ]
+        return ready(
+            self,
+            traces,
+            self._layout(palette, low, high),
+            summary=self._summary(len(outside)),
+            table=self._table(recorded),
+        )
 
     def _recorded(self) -> list[Drawn]:
         return [

@@ -161,7 +161,12 @@ class History(Scored):
     @cached_property
     def best(self) -> FlightData | None:
         """The valid flight with the lowest error, the earliest of equals."""
-        return min(self.valid, key=_error, default=None)
+        return min(self.valid, key=lambda flight: (flight.error, flight.number), default=None)
+
+    @property
+    def valid_errors(self) -> list[float]:
+        """Errors of the valid flights, in their order."""
+        return [flight.error for flight in self.valid if flight.error is not None]
 
     @property
     def is_best_of_best_gains(self) -> bool:
@@ -192,8 +197,3 @@ class History(Scored):
         if flight is not self.flights[-1]:
             return "earlier"
         return "baseline" if len(self.flights) > 1 and flight.gains == self.flights[0].gains else "latest"
-
-
-def _error(flight: FlightData) -> float:
-    assert flight.error is not None
-    return flight.error

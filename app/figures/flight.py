@@ -79,31 +79,30 @@ class FlightFigure:
     title: ClassVar[str] = "Flight record"
 
     def not_ready(self) -> str | None:
-        if self.record.curve is None or len(self.record.curve.time_s) == 0:
-            if self.record.is_over:
-                return "No record of this flight was received."
-            return "There is no record of this flight yet."
-        return None
+        if self.record.curve is not None and len(self.record.curve.time_s):
+            return None
+        return (
+            "No record of this flight was received."
+            if self.record.is_over
+            else "There is no record of this flight yet."
+        )
 
     def compute(self) -> Card:
-        palette, curve = theme.PALETTES[self.theme_name], self.record.curve
+        palette, record, curve = theme.PALETTES[self.theme_name], self.record, self.record.curve
         assert curve is not None
-        traces = [*self._outputs(palette, curve), *self._deviation(palette, curve), *self._channels(palette)]
+        traces = [
+            *band_traces(palette, record.band),
+            *self._context(palette),
+            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", record.output_unit),
+            *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
+            *self._deviation(palette, curve),
+            *self._channels(palette),
+        ]
         return ready(self, traces, self._layout(palette, curve), summary=self._summary(), table=self._table(curve))
 
     @property
     def _has_deviation(self) -> bool:
         return is_step(self.record.set_point)
-
-    def _outputs(self, palette: theme.Palette, curve: Curve) -> list[Trace]:
-        """The flight with its context curves, and its glitches on top."""
-        record = self.record
-        return [
-            *band_traces(palette, record.band),
-            *self._context(palette),
-            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", record.output_unit),
-            *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
-        ]
 
     def _deviation(self, palette: theme.Palette, curve: Curve) -> Iterator[Trace]:
         record = self.record
@@ -177,27 +176,20 @@ class FlightFigure:
         )
 
     def _context(self, palette: theme.Palette) -> list[Trace]:
+        """What the flight is compared with, as far as it is known."""
         record, unit = self.record, self.record.output_unit
-        drawn = [_line("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot")]
-        if record.reference is not None:
-            drawn.append(
-                _line(
-                    "Reference",
-                    scored_part(record.reference, record.set_point),
-                    palette.dim,
-                    1.5,
-                    "reference",
-                    None,
-                    "dashdot",
-                )
-            )
-        if record.best is not None:
-            drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
-        if record.predicted is not None:
-            drawn.append(
-                _line(record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash")
-            )
-        return drawn
+        goal = None if record.reference is None else scored_part(record.reference, record.set_point)
+        curves = (
+            ("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot"),
+            ("Reference", goal, palette.dim, 1.5, "reference", None, "dashdot"),
+            (f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit, "solid"),
+            (record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash"),
+        )
+        return [
+            _line(name, curve, colour, width, role, shown, dash)
+            for name, curve, colour, width, role, shown, dash in curves
+            if curve is not None
+        ]
 
     def _summary(self) -> str:
         record = self.record

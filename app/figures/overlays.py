@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
 from app.figures import theme
@@ -225,8 +224,9 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
     curves = [curve for curve in curves if len(curve.time_s)]
     if not curves:
         return None
-    instants = _instants(until_s)
-    table: NDArray[np.float64] = np.array([np.interp(instants, curve.time_s, curve.values) for curve in curves])
+    early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)
+    instants = np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
+    table = np.array([np.interp(instants, curve.time_s, curve.values) for curve in curves])
     lower, middle, upper = np.percentile(table, PERCENTILES, axis=0)
     band = Band(lower=Curve(instants, lower), upper=Curve(instants, upper))
     return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
@@ -252,11 +252,6 @@ def envelope_traces(palette: theme.Palette, envelope: Envelope | None, unit: str
         legendrank=800,
         hovertemplate=reading(f"Median of {envelope.flights} flights", unit),
     )
-
-
-def _instants(until_s: float) -> Samples:
-    early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)
-    return np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
 
 
 def _points(curve: Curve) -> tuple[list[float], list[float]]:

@@ -100,18 +100,19 @@ class CalibrationFigure:
     def _tuned(self, palette: theme.Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
-        suffixes = map(theme.suffix, range(1, panels + 1))
         return [
             theme.upright(self.since, palette.prediction, 1.5, xref=f"x{suffix}", yref=f"y{suffix} domain")
-            for suffix in suffixes
+            for suffix in map(theme.suffix, range(1, panels + 1))
         ]
 
     def _table(self, first: Mapping[str, Fitted]) -> Table:
-        columns = [Column("flight", "Flight of the vehicle", digits=0), Column("campaign", "Campaign", digits=0)]
-        columns.append(Column("trial", "Its flight", digits=0))
+        columns = [
+            Column("flight", "Flight of the vehicle", digits=0),
+            Column("campaign", "Campaign", digits=0),
+            Column("trial", "Its flight", digits=0),
+        ]
         for name, one in first.items():
-            columns.append(Column(name, one.title, one.unit))
-            columns.append(Column(f"{name}_se", "Standard error", one.unit))
+            columns += [Column(name, one.title, one.unit), Column(f"{name}_se", "Standard error", one.unit)]
         rows: list[tuple[Cell, ...]] = []
         for point in self.points:
             cells: list[Cell] = [point.flight, point.campaign_id, point.trial_number]
