@@ -136,7 +136,7 @@ class ComparisonFigure:
             thinned(curve.time_s, curve.values, POINTS),
             role="flight",
             about={"trial": flight.trial_id},
-            line=_pen(palette, index),
+            line=pen(palette, index),
             legendgroup=flight.label,
             hovertemplate=reading(f"{flight.label} · {literal(flight.name)}", self.data.output_unit, error),
         )
@@ -148,7 +148,7 @@ class ComparisonFigure:
             thinned(curve.time_s, curve.values, POINTS),
             role="difference",
             about={"trial": flight.trial_id},
-            line=_pen(palette, index),
+            line=pen(palette, index),
             legendgroup=flight.label,
             yaxis="y2",
             showlegend=False,
@@ -182,16 +182,11 @@ class ComparisonFigure:
         return table_of_curves(seconds.tolist(), 2, data.output_unit, named)
 
 
-def line_style(palette: theme.Palette, index: int) -> tuple[str, str]:
-    """Colour and dash of the flight at an index; neighbours differ in both."""
+def pen(palette: theme.Palette, index: int) -> dict[str, object]:
+    """Line of the flight at an index; neighbours differ in colour and dash."""
     teal, orange, blue = palette.gains
     colours = (palette.ink, teal, orange, blue, palette.prediction, palette.bad)
-    return colours[index % len(colours)], DASHES[(index + index // len(colours)) % len(DASHES)]
-
-
-def _pen(palette: theme.Palette, index: int) -> dict[str, object]:
-    colour, dash = line_style(palette, index)
-    return theme.line(colour, 2, dash)
+    return theme.line(colours[index % len(colours)], 2, DASHES[(index + index // len(colours)) % len(DASHES)])
 
 
 def _less(curve: Curve, first: Curve) -> Curve:

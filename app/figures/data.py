@@ -171,9 +171,8 @@ class History(Scored):
     @property
     def is_best_of_best_gains(self) -> bool:
         """Whether the best flight has the gains with the best mean, as far as the scatter is known."""
-        if self.best is None or self.noise is None or not self.noise.best_numbers:
-            return True
-        return self.best.number in self.noise.best_numbers
+        known = () if self.noise is None else self.noise.best_numbers
+        return self.best is None or not known or self.best.number in known
 
     @property
     def next_flights(self) -> tuple[NextFlight, ...]:

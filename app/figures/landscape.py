@@ -116,12 +116,12 @@ class LandscapeFigure:
 
     def _taken(self, one: Slice) -> list[Box]:
         """The room of all marks and numbers in a slice."""
-        shown, proposal = self._shown(), self.history.proposal
-        marked = [*(flight.gains for flight in shown), *(step.gains for step in self.search.tried)]
-        marked += [] if proposal is None else [proposal.gains]
+        shown = self._shown()
+        marked = [flight.gains for flight in (*shown, *self.history.next_flights)]
         texts = zip(shown, self._texts(one), strict=True)
         return [
             *(mark_box(one, gains) for gains in marked),
+            *(mark_box(one, step.gains) for step in self.search.tried),
             *(number_box(one, flight.gains, text) for flight, text in texts if text),
         ]
 
@@ -162,32 +162,27 @@ class LandscapeFigure:
             hovertext=[_hover_text(flight, unit) for flight in flights],
         )
         if best is not None:
-            edge = {"width": 1.5, "color": palette.surface}
             yield draw(
                 [best.gains],
                 "best",
                 f"Best, flight {best.number}",
                 "markers",
-                marker=theme.solid(palette.best, size=_STAR_PX, symbol="star", line=edge),
+                marker=_edged(palette, palette.best, size=_STAR_PX, symbol="star"),
                 hovertext=[_hover_text(best, unit)],
             )
 
     def _proposed(self, palette: theme.Palette, draw: Callable[..., Trace]) -> Iterator[Trace]:
-        proposal = self.history.proposal
-        if proposal is None:
-            return
-        prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
-        edge = {"width": 1.5, "color": palette.surface}
-        yield draw(
-            [proposal.gains],
-            "proposed",
-            f"Next, flight {proposal.number}",
-            "markers",
-            marker=theme.solid(palette.prediction, size=13, symbol="diamond", line=edge),
-            hovertext=[
-                f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
-            ],
-        )
+        unit = self.history.error_unit
+        for proposal in self.history.next_flights:
+            error = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
+            yield draw(
+                [proposal.gains],
+                "proposed",
+                f"Next, flight {proposal.number}",
+                "markers",
+                marker=_edged(palette, palette.prediction, size=13, symbol="diamond"),
+                hovertext=[f"Flight {proposal.number}, proposed{error} {unit if error else ''}"],
+            )
 
     def _axes(self, palette: theme.Palette, index: int, one: Slice) -> dict[str, object]:
         across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
@@ -241,11 +236,10 @@ class LandscapeFigure:
             for flight in history.flights
         ]
         rows += [self._row("Tried on the model", step.gains, step.predicted_error, None) for step in self.search.tried]
-        if history.proposal is not None:
-            next_one = history.proposal
-            rows.append(
-                self._row(f"Flight {next_one.number}, proposed", next_one.gains, next_one.predicted_error, None)
-            )
+        rows += [
+            self._row(f"Flight {flight.number}, proposed", flight.gains, flight.predicted_error, None)
+            for flight in history.next_flights
+        ]
         for one in self.landscape.slices:
             gains, error = lowest(one, self.landscape.centre)
             rows.append(self._row(f"Lowest of {one.y} over {one.x}", gains, error, None))
@@ -277,6 +271,11 @@ def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str,
         cliponaxis=True,
         **more,
     )
+
+
+def _edged(palette: theme.Palette, colour: str, **mark: object) -> dict[str, object]:
+    """A filled mark that stands out from the contours and the path."""
+    return theme.solid(colour, **mark, line={"width": 1.5, "color": palette.surface})
 
 
 def _hover_text(flight: FlightData, unit: str) -> str:

@@ -67,12 +67,21 @@ PRINT: Final = 0.18
 def off_scale_traces(
     palette: theme.Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
 ) -> list[Trace]:
-    """Marks at height `top` of an axis that ends with flight `last`.
-
-    If there are few flights, with the errors that have room.
+    """Marks at height `top` of an axis that ends with flight `last`: of many flights in one trace, of few one each, and
+    with the errors that have room.
     """
     if crowded:
-        return [_together(palette, flights, top, unit)] if flights else []
+        together = scatter(
+            "Off scale",
+            ([flight.number for flight in flights], [top] * len(flights)),
+            role="off scale",
+            mode="markers",
+            text=[f"{flight.error:.2f} {unit}" for flight in flights],
+            marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
+            cliponaxis=False,
+            hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+        )
+        return [together] if flights else []
     printed = set(_with_room([flight.number for flight in flights], PRINT * last))
     return [_alone(palette, flight, top, unit, in_print=flight.number in printed) for flight in flights]
 
@@ -101,20 +110,6 @@ def _alone(palette: theme.Palette, flight: FlightData, top: float, unit: str, *,
         textfont=_readable(palette.bad),
         cliponaxis=False,
         hovertemplate=f"{text}<extra></extra>",
-    )
-
-
-def _together(palette: theme.Palette, flights: Sequence[FlightData], top: float, unit: str) -> Trace:
-    """Many flights in one trace, without printed errors."""
-    return scatter(
-        "Off scale",
-        ([flight.number for flight in flights], [top] * len(flights)),
-        role="off scale",
-        mode="markers",
-        text=[f"{flight.error:.2f} {unit}" for flight in flights],
-        marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
-        cliponaxis=False,
-        hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
     )
 
 

@@ -115,12 +115,14 @@ class TrajectoriesFigure:
                 window=self._visible,
             )
         traces += [*leaving_top, *leaving]
-        opening = "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s"
         layout = theme.layout(
             palette,
             **self._axes(palette, low, high),
             margin=dict(theme.SIGNED_MARGIN_PX),
-            meta={"whole_s": self._whole_s, "opening": opening},
+            meta={
+                "whole_s": self._whole_s,
+                "opening": "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s",
+            },
             uirevision="takeoffs",
         )
         summary = self._summary(len(leaving_top), len(leaving))

@@ -205,5 +205,13 @@ def note(palette: Palette, text: str, **more: object) -> dict[str, object]:
 
 def upright(at: float, colour: str, width: float, **axes: object) -> dict[str, object]:
     """A dotted vertical line behind the curves, from the bottom to the top of these axes."""
-    line = {"color": colour, "width": width, "dash": "dot"}
-    return {"type": "line", "x0": at, "x1": at, "y0": 0, "y1": 1, "layer": "below", "line": line, **axes}
+    return {
+        "type": "line",
+        "x0": at,
+        "x1": at,
+        "y0": 0,
+        "y1": 1,
+        "layer": "below",
+        "line": {"color": colour, "width": width, "dash": "dot"},
+        **axes,
+    }
