@@ -46,7 +46,8 @@ class ErrorsFigure:
 
     def compute(self) -> Card:
         palette, history = theme.PALETTES[self.theme_name], self.history
-        (top, outside), strip = self._top(), self._strip(palette)
+        top, outside = self._top()
+        strip = self._strip(palette)
         traces = [
             *self._noise(palette),
             self._best_so_far(palette),
@@ -329,7 +330,8 @@ class ErrorsFigure:
         best, errors = self.history.best, self.history.valid_errors
         if best is None:
             return "No valid flight yet."
-        first, lowest = self.history.valid[0], min(errors)
+        first = self.history.valid[0]
+        lowest = min(errors)
         share = "" if best is first else f", {100 * (1 - lowest / errors[0]):.0f} % below flight {first.number}"
         return f"Best error {formatting.short(lowest)} {self.history.error_unit} in flight {best.number}{share}."
 

@@ -186,11 +186,12 @@ def place_labels(one: Slice, scale: Scale, taken: Sequence[Box]) -> dict[str, Bo
     """The error of each contour, and the room of that label at its point farthest from all that is `taken` and from the
     labels before it; none for a contour without a free point."""
     labels: dict[str, Box] = {}
+    width, height = _LABEL_ROOM
     for level in scale.levels:
         text = f"{level:g}"
-        width, height = _LABEL_ROOM
         rooms = [Box(position, (len(text) * width, height)) for position in _crossings(one, level)]
-        inside, covered = [room for room in rooms if room.is_within_slice], [*taken, *labels.values()]
+        covered = [*taken, *labels.values()]
+        inside = [room for room in rooms if room.is_within_slice]
         farthest = max(inside, key=lambda room: room.clearance(covered), default=None)
         if farthest is not None and farthest.clearance(covered) > 0.0:
             labels[text] = farthest
