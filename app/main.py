@@ -17,16 +17,13 @@ from app import __version__
 from app.accounts.keys_and_links import Keyring
 from app.bundles.router import router as bundles
 from app.campaigns import catalogue
+from app.campaigns import router as campaigns
 from app.campaigns.flight_predictions import PredictorCache
-from app.campaigns.router import figures_router, vehicles_router
-from app.campaigns.router import router as campaigns
-from app.campaigns.trials.router import router as trials
-from app.campaigns.trials.router import uploads
+from app.campaigns.trials import router as trials
 from app.common.errors import NotFoundError
 from app.common.settings import Settings
 from app.compare.router import router as compare
-from app.controller_checks.router import recordings
-from app.controller_checks.router import router as controller_checks
+from app.controller_checks import router as controller_checks
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.fleet.router import router as fleet
@@ -36,11 +33,9 @@ from app.live.hub import live_link
 from app.log_analyses.router import router as log_analyses
 from app.reports.router import router as reports
 from app.reproductions.router import router as reproductions
-from app.web import errors, events, system
-from app.web.errors import describe
+from app.web import errors, events, system, unlock
 from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware
 from app.web.origin import AccessMiddleware
-from app.web.unlock import unlock_router
 
 gc.freeze()
 gc.enable()
@@ -79,31 +74,30 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.settings = settings
     app.state.database = database
     app.state.predictors = PredictorCache()
-    own = (
+    for router in (
         catalogue.router,
         system.router,
-        unlock_router,
-        campaigns,
-        trials,
+        unlock.unlock_router,
+        campaigns.router,
+        trials.router,
         flights,
-        uploads,
+        trials.uploads,
         fleet,
         jobs,
         reproductions,
-        controller_checks,
-        recordings,
+        controller_checks.router,
+        controller_checks.recordings,
         log_analyses,
         compare,
         reports,
         bundles,
-        vehicles_router,
-        figures_router,
+        campaigns.vehicles_router,
+        campaigns.figures_router,
         events.router,
-    )
-    for router in own:
+    ):
         app.include_router(router)
     errors.install(app)
-    describe(app)
+    errors.describe(app)
     app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.problem_response)
     app.add_middleware(
         AccessMiddleware,

@@ -275,7 +275,7 @@ def analyze(
     json_out: JsonOut = None,
 ) -> None:
     """Propose better altitude gains from a flight log, and print what the model predicts for them."""
-    from app.cli.analyze import analyze_log
+    from app.cli.files import analyze_log
 
     analyze_log(log, json_out=json_out, params_out=params)
 

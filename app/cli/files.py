@@ -1,4 +1,6 @@
-"""`gainline import`, `report`, `bundle`, `unbundle`: flight logs in, reports out, and whole campaigns in and out."""
+"""`gainline import`, `analyze`, `report`, `bundle`, `unbundle`: flight logs in, what the model says of one, reports
+out, and whole campaigns in and out.
+"""
 
 import sys
 from collections.abc import Iterator, Mapping
@@ -17,12 +19,13 @@ from app.bundles.reader import Bundle
 from app.campaigns import service as campaigns
 from app.campaigns.trials import records
 from app.campaigns.trials.schemas import Trial
-from app.cli.console import console, reading, write_json, writing
+from app.cli.console import console, reading, table, write_json, writing
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
+from app.log_analyses.schemas import LogAnswer
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
@@ -84,21 +87,18 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
-    def attempt(accepted: frozenset[str]) -> Trial:
-        with database.write() as session:
-            return records.import_into_campaign(
-                session,
-                campaign,
-                flown,
-                number=trial,
-                confirmed=yes or "confirm" in accepted,
-                invalid=yes or "invalid" in accepted,
-            )
-
     accepted: frozenset[str] = frozenset()
     while True:
         try:
-            return attempt(accepted)
+            with database.write() as session:
+                return records.import_into_campaign(
+                    session,
+                    campaign,
+                    flown,
+                    number=trial,
+                    confirmed=yes or "confirm" in accepted,
+                    invalid=yes or "invalid" in accepted,
+                )
         except UnconfirmedError as needed:
             if not can_ask():
                 raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
@@ -109,13 +109,52 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
 
 
 def _print(out: Console, trial: Trial) -> None:
-    gains = format_gains(trial.gains)
     error = "no error" if trial.error is None else f"error {trial.error:.4f}"
-    out.print(f"Trial {trial.number} of campaign {trial.campaign_id}, {gains}: {trial.state}, {error}.")
+    out.print(
+        f"Trial {trial.number} of campaign {trial.campaign_id}, {format_gains(trial.gains)}: {trial.state}, {error}."
+    )
     if trial.reason:
         out.print(escape(trial.reason))
     for glitch in trial.glitches:
         out.print(escape(glitch.sentence))
+
+
+def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -> None:
+    """Print the analysis of a log, and write it and the proposed parameters where asked for.
+
+    Raises InputError for a log that cannot be analysed, and for a parameter file where nothing is proposed.
+    """
+    from app.log_analyses.content import ANALYSED, analyze_content  # noqa: PLC0415 - imports every reader
+
+    with reading(file, ANALYSED):
+        beside = companion_of(file)
+        content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
+    answer, _ = analyze_content(content, companion, file.name)
+    _print_answer(console(json_out), answer)
+    write_json(json_out, answer.model_dump(mode="json"))
+    if params_out is not None:
+        _write_parameters(params_out, answer)
+
+
+def _print_answer(out: Console, answer: LogAnswer) -> None:
+    out.print(f"[bold]{escape(answer.file_name)}[/]")
+    out.print(escape(f"Flight: {', '.join(answer.flight)}."))
+    out.print(escape(f"Vehicle: {', '.join(answer.vehicle)}."))
+    out.print(table(answer.gains.columns, answer.gains.rows, title="This flight with other gains"))
+    for note in answer.notes:
+        out.print(escape(note), style="dim")
+    out.print(escape(answer.answer))
+
+
+def _write_parameters(target: Path, answer: LogAnswer) -> None:
+    if answer.parameter_file is None:
+        raise InputError(
+            "No parameter file was written, because nothing is proposed.",
+            hint=answer.answer,
+            problems=(Problem("--params", "has nothing to write"),),
+        )
+    with writing("--params", target):
+        target.write_text(answer.parameter_file.content, encoding="utf-8")
 
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:

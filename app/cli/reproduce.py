@@ -25,7 +25,7 @@ from app.common.errors import InputError
 from app.core.formatting import format_gains
 from app.reproductions.controller import run_controller
 from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction
-from app.reproductions.results import Result, Row
+from app.reproductions.results import Result
 
 ALL: Final = "all"
 
@@ -54,25 +54,21 @@ def _show(each: Reproduction, result: Result, json_out: Path | None) -> None:
     out = console(json_out)
     out.print(f"\n[bold]{each.title}[/]\nIn the paper: {each.paper}\n")
     for group, rows in groupby(result.rows, key=lambda row: row.group):
-        out.print(_table(group, list(rows)))
+        cells = [
+            (
+                row.label,
+                row.unit,
+                f"{row.measured:.{row.digits}f}",
+                _number(row.paper, row.digits),
+                _number(row.ratio, 3),
+                _number(row.reference, row.digits),
+                row.note,
+            )
+            for row in rows
+        ]
+        out.print(table(("", "unit", "measured", "paper", "ratio", "reference", ""), cells, title=group))
     for note in result.notes:
         out.print(f"[dim]{escape(note)}[/]")
-
-
-def _table(group: str, rows: Sequence[Row]) -> Table:
-    cells = [
-        (
-            row.label,
-            row.unit,
-            f"{row.measured:.{row.digits}f}",
-            _number(row.paper, row.digits),
-            _number(row.ratio, 3),
-            _number(row.reference, row.digits),
-            row.note,
-        )
-        for row in rows
-    ]
-    return table(("", "unit", "measured", "paper", "ratio", "reference", ""), cells, title=group)
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -180,8 +180,9 @@ class _Campaign:
         self._display.planned(planned.number, request.gains)
         outcome = flight_rows.outcome_of(self._fly(request))
         if outcome.record is None:
-            why = end_text(outcome.end)
-            raise VehicleError(f"Flight {planned.number}: {why}", hint="Correct this, then run it again.")
+            raise VehicleError(
+                f"Flight {planned.number}: {end_text(outcome.end)}", hint="Correct this, then run it again."
+            )
         with self._database.write() as session:
             flight_rows.record_outcome(session, request.flight_id, outcome)
             trial = history.trial_row(session, request.trial_id)
@@ -222,7 +223,7 @@ class _Campaign:
                 self._display.hold(request.safe_gains)
 
 
-class _Display:
+class _Display(Progress):
     """Progress line of the running flight, on standard error; finished flights are printed above it.
 
     `kinds` are those of the flights' proposals, which can be `none`: the strategy proposed no further step.
@@ -230,7 +231,7 @@ class _Display:
     """
 
     def __init__(self, definition: Definition, experiment: Experiment) -> None:
-        self._progress = Progress(
+        super().__init__(
             SpinnerColumn(),
             TextColumn("{task.description}"),
             BarColumn(),
@@ -238,7 +239,7 @@ class _Display:
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self._progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
+        self._task = self.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
         self._output, self._output_unit = experiment.output, CHANNEL_UNITS[experiment.output]
@@ -247,18 +248,11 @@ class _Display:
         self.touched = False
         self.held: Mapping[str, float] | None = None
 
-    def __enter__(self) -> "_Display":
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
     def hold(self, gains: Mapping[str, float] | None) -> None:
         self.touched, self.held = True, gains
 
     def planned(self, number: int, gains: Gains) -> None:
-        self._progress.update(
+        self.update(
             self._task,
             completed=0.0,
             note="",
@@ -266,19 +260,17 @@ class _Display:
         )
 
     def sampled(self, sample: Sample) -> None:
-        self._progress.update(
-            self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}"
-        )
+        self.update(self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}")
 
     def landed(self, trial: TrialRow, kind: str) -> None:
         self.trials.append(trial)
         self.kinds.append(kind)
-        self._progress.console.print(
+        self.console.print(
             f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
             f"({trial.state}{f': {reason}' if (reason := reason_of(trial)) else ''})",
             highlight=False,
         )
-        self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
+        self.update(self._task, description="computing the next gains", completed=0.0, note="")
 
 
 def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _Display, stopped_because: str) -> None:
@@ -353,8 +345,9 @@ def _document(
 
 def _prediction(trial: TrialRow, trials: Sequence[TrialRow]) -> tuple[float | None, Interval | None]:
     """The trial's predicted error and interval, as in the API."""
-    is_corrected = history.is_corrected(trials, trial.number)
-    return history.told_prediction(trial.predicted_error, trial.predicted_interval, corrected=is_corrected)
+    return history.told_prediction(
+        trial.predicted_error, trial.predicted_interval, corrected=history.is_corrected(trials, trial.number)
+    )
 
 
 def _error(value: float | None, unit: str) -> str:

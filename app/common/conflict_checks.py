@@ -57,7 +57,9 @@ def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str
     if to not in moves[state]:
         raise ConflictError(
             f"{what} is {state_label(state)} and cannot change to “{state_label(to)}”.",
-            hint=_look_again(sorted(moves[state])),
+            hint=f"Reload it; from here it can change to “{_or(moves[state], '” or “', '”, “')}”."
+            if moves[state]
+            else "This state is final.",
         )
     return to
 
@@ -109,11 +111,3 @@ def state_label(state: str) -> str:
 def _or(states: Iterable[str], last_by: str = " or ", others_by: str = ", ") -> str:
     *others, last = sorted(map(state_label, states))
     return f"{others_by.join(others)}{last_by}{last}" if others else last
-
-
-def _look_again(possible: list[S]) -> str:
-    return (
-        f"Reload it; from here it can change to “{_or(possible, '” or “', '”, “')}”."
-        if possible
-        else "This state is final."
-    )

@@ -96,15 +96,10 @@ def lines_of_job(data_dir: Path, job_id: int, *, since: datetime, limit: int) ->
     job.
     """
     found: list[LogLine] = []
-    for file in reversed([data_dir / "log" / f"worker.log{suffix}" for suffix in _suffixes()]):
+    for suffix in (*(f".{number}" for number in range(KEPT_LOGS, 0, -1)), ""):
+        file = data_dir / "log" / f"worker.log{suffix}"
         found.extend(line for line in _of_file(file, job_id, since) if line.at >= since)
     return found[-limit:], len(found)
-
-
-def _suffixes() -> Iterator[str]:
-    """Suffixes of the log files, newest file first."""
-    yield ""
-    yield from (f".{number}" for number in range(1, KEPT_LOGS + 1))
 
 
 def _of_file(file: Path, job_id: int, since: datetime) -> Iterator[LogLine]:

@@ -19,14 +19,13 @@ from pydantic_core import PydanticCustomError
 from app.common.errors import InputError
 from app.common.errors import Problem as FieldProblem
 
-_BIDIRECTIONAL: Final = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Marks, embeddings, overrides and isolates (Unicode Standard Annex 9)."""
-_LINE_ENDS: Final = frozenset("\u2028\u2029")
+_REORDERING: Final = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u2028\u2029")
+"""Marks, embeddings, overrides and isolates (Unicode Standard Annex 9), and separators of lines and paragraphs."""
 
 
 def is_control(character: str) -> bool:
     """Whether the character is in C0 or C1 (escape included), DEL, a bidirectional control or a line separator."""
-    return unicodedata.category(character) == "Cc" or character in _BIDIRECTIONAL or character in _LINE_ENDS
+    return unicodedata.category(character) == "Cc" or character in _REORDERING
 
 
 def find_control_characters(text: str) -> tuple[str, ...]:

@@ -13,7 +13,6 @@ from typing import BinaryIO, Final
 from app.common.errors import StorageError
 from app.db.session import translated
 
-_COPY: Final = "gainline.sqlite3"
 _PREFIX: Final = ".gainline-partial-copy-"
 """Of folders that are deleted; nobody names a folder of their own like that."""
 SPARE_BYTES: Final = 2**28
@@ -35,7 +34,7 @@ def take_backup(database_file: Path, require_intact: Callable[[Path], None]) -> 
         _locked(database_file.parent, fcntl.LOCK_SH),
         tempfile.TemporaryDirectory(prefix=_PREFIX, dir=database_file.parent) as folder,
     ):
-        copied = Path(folder) / _COPY
+        copied = Path(folder) / "gainline.sqlite3"
         with closing(sqlite3.connect(database_file)) as source, closing(sqlite3.connect(copied)) as copy:
             copy.execute("PRAGMA synchronous = OFF")  # after a power cut the copy is worthless anyway
             source.backup(copy)

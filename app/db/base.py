@@ -1,12 +1,13 @@
 """What the tables have in common: naming, types, states, ids, and the publication of changes."""
 
+import enum
+import re
 from collections.abc import Iterable
 from datetime import datetime
-from enum import StrEnum
 from typing import Any, ClassVar, Final, Literal, TypeVar
 
 from sqlalchemy import JSON, CheckConstraint, Enum, MetaData
-from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, Session, declared_attr, mapped_column
 
 from app.db.types import FlightEndJson, GainsJson, JsonObject, OptionsJson, UtcDateTime
 from app.vehicles.flight_end import FlightEnd
@@ -23,14 +24,21 @@ NAMING: Final = {
 
 
 _JSON: Final = JSON(none_as_null=True)
+_STATE: Final = Enum(
+    enum.Enum, native_enum=False, length=20, values_callable=lambda every: [state.value for state in every]
+)
+"""A state is stored as text; the check is a separate constraint, so that a migration can change it."""
 NEVER_REUSE_IDS: Final = {"sqlite_autoincrement": True}
 """Otherwise SQLite gives a deleted row's id to the next one, and an open page would show the wrong row."""
 
 
 class Base(DeclarativeBase):
+    """A table, named as its class without `Row`."""
+
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
         datetime: UtcDateTime,
+        enum.StrEnum: _STATE,
         FlightEnd: FlightEndJson,
         JsonObject: _JSON,
         GainsJson: _JSON,
@@ -40,18 +48,17 @@ class Base(DeclarativeBase):
         list[JsonObject]: _JSON,
     }
 
+    @declared_attr.directive
+    def __tablename__(cls) -> str:  # noqa: N805 - SQLAlchemy calls it with the class
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__.removesuffix("Row")).lower()
 
-def is_one_of(column: str, states: Iterable[StrEnum]) -> str:
+
+def is_one_of(column: str, states: Iterable[enum.StrEnum]) -> str:
     return f"{column} IN ({', '.join(repr(state.value) for state in states)})"
 
 
-def state_check(states: type[StrEnum], *, column: str = "state") -> CheckConstraint:
+def state_check(states: type[enum.StrEnum], *, column: str = "state") -> CheckConstraint:
     return CheckConstraint(is_one_of(column, states), name=column)
-
-
-def state_type(states: type[StrEnum]) -> Enum:
-    """Column type of a state, stored as text; the check is a separate constraint, so that a migration can change it."""
-    return Enum(states, native_enum=False, length=20, values_callable=lambda every: [state.value for state in every])
 
 
 class Numbered:

@@ -1,7 +1,6 @@
 """The tables. The database checks the states too; the transitions between them are in each slice's `states.py`."""
 
 from datetime import datetime
-from typing import Final
 
 from sqlalchemy import CheckConstraint, ForeignKey, Index, LargeBinary, String, UniqueConstraint, text
 from sqlalchemy.orm import Mapped, mapped_column, relationship
@@ -23,7 +22,7 @@ from app.common.states import (
     VehicleState,
 )
 from app.core.tuning.strategy import Kind as ProposalKind
-from app.db.base import NEVER_REUSE_IDS, Base, Numbered, Reported, Topic, is_one_of, state_check, state_type
+from app.db.base import NEVER_REUSE_IDS, Base, Numbered, Reported, Topic, is_one_of, state_check
 from app.db.types import GainsJson, JsonObject, OptionsJson, utc_now
 from app.vehicles.flight_end import FlightEnd
 
@@ -38,7 +37,6 @@ class VehicleRow(Base, Reported):
     """
 
     topic = "vehicle"
-    __tablename__ = "vehicle"
     __table_args__ = (state_check(VehicleState), NEVER_REUSE_IDS)
 
     version: Mapped[int] = mapped_column(default=1, server_default="1")
@@ -47,7 +45,7 @@ class VehicleRow(Base, Reported):
     title: Mapped[str]
     is_real: Mapped[bool]
     registered: Mapped[bool] = mapped_column(default=False, server_default=text("0"))
-    state: Mapped[VehicleState] = mapped_column(state_type(VehicleState))
+    state: Mapped[VehicleState]
     concern: Mapped[str] = mapped_column(default="")
     options: Mapped[OptionsJson] = mapped_column(default=dict, server_default=text("'{}'"))
     identity: Mapped[JsonObject | None]
@@ -64,16 +62,12 @@ class VehicleRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-_ACT_UNDER_WAY_SQL: Final = is_one_of("state", sorted(ACTIVE_ACT_STATES))
-
-
 class VehicleActRow(Base, Reported):
     """An act: a request to a registered vehicle beside its flights, who made it and why, and the vehicle's answer.
 
     Written before anything is sent; except for land and motors off, which are sent at once and recorded afterwards.
     """
 
-    __tablename__ = "vehicle_act"
     __table_args__ = (
         state_check(ActState),
         state_check(ActKind, column="kind"),
@@ -81,15 +75,14 @@ class VehicleActRow(Base, Reported):
             "uq_vehicle_act_vehicle_under_way",
             "vehicle_id",
             unique=True,
-            sqlite_where=text(_ACT_UNDER_WAY_SQL),
-            postgresql_where=text(_ACT_UNDER_WAY_SQL),
+            sqlite_where=text(is_one_of("state", sorted(ACTIVE_ACT_STATES))),
         ),
         NEVER_REUSE_IDS,
     )
 
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
-    kind: Mapped[ActKind] = mapped_column(state_type(ActKind))
-    state: Mapped[ActState] = mapped_column(state_type(ActState))
+    kind: Mapped[ActKind]
+    state: Mapped[ActState]
     by: Mapped[str] = mapped_column(default="")
     reason: Mapped[str] = mapped_column(default="")
     asked: Mapped[GainsJson | None]
@@ -115,7 +108,6 @@ class CampaignRow(Base, Reported):
     a reopening.
     """
 
-    __tablename__ = "campaign"
     __table_args__ = (
         state_check(CampaignState),
         state_check(Outcome, column="outcome"),
@@ -125,8 +117,8 @@ class CampaignRow(Base, Reported):
 
     version: Mapped[int] = mapped_column(default=1)
     name: Mapped[str]
-    state: Mapped[CampaignState] = mapped_column(state_type(CampaignState), index=True)
-    outcome: Mapped[Outcome | None] = mapped_column(state_type(Outcome))
+    state: Mapped[CampaignState] = mapped_column(index=True)
+    outcome: Mapped[Outcome | None]
     stop_reason: Mapped[str] = mapped_column(default="")
     experiment: Mapped[str]
     strategy: Mapped[str]
@@ -149,16 +141,12 @@ class CampaignRow(Base, Reported):
 class RehearsalRow(Base):
     """A campaign on a simulation that rehearses one on a real vehicle."""
 
-    __tablename__ = "rehearsal"
-
     rehearsal_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), primary_key=True)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
 
 
 class TrajectoryRow(Base, Numbered):
     """One recorded or predicted flight, packed by `app.db.trajectories`. Written once; the database refuses changes."""
-
-    __tablename__ = "trajectory"
 
     codec: Mapped[int]
     columns: Mapped[list[str]]
@@ -182,7 +170,6 @@ class TrialRow(Base, Reported):
     """
 
     topic = "trial"
-    __tablename__ = "trial"
     __table_args__ = (
         state_check(TrialState),
         CheckConstraint("state != 'valid' OR error IS NOT NULL", name="valid_is_scored"),
@@ -194,7 +181,7 @@ class TrialRow(Base, Reported):
     version: Mapped[int] = mapped_column(default=1)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"))
     number: Mapped[int]
-    state: Mapped[TrialState] = mapped_column(state_type(TrialState))
+    state: Mapped[TrialState]
     kind: Mapped[TrialKind] = mapped_column(String)
     gains: Mapped[GainsJson]
     read_back: Mapped[GainsJson | None]
@@ -233,8 +220,6 @@ class TrialRow(Base, Reported):
 class TrialPhotoRow(Base, Reported):
     """A picture of a flight, as uploaded."""
 
-    __tablename__ = "trial_photo"
-
     trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="CASCADE"), index=True)
     media_type: Mapped[str]
     data: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
@@ -250,16 +235,11 @@ class ControllerCheckRow(Base, Reported):
     """A recorded controller compared with the replica, with all data of its page."""
 
     topic = "check"
-    __tablename__ = "controller_check"
-
     file_name: Mapped[str]
     kind: Mapped[str]
     passed: Mapped[bool]
     result: Mapped[JsonObject] = mapped_column(deferred=True)
     checked_at: Mapped[datetime] = mapped_column(default=utc_now)
-
-
-_UNDER_WAY_SQL: Final = is_one_of("state", sorted(ACTIVE_FLIGHT_STATES))
 
 
 class FlightRow(Base, Reported):
@@ -273,15 +253,13 @@ class FlightRow(Base, Reported):
     """
 
     topic = "flight"
-    __tablename__ = "flight"
     __table_args__ = (
         state_check(FlightState),
         Index(
             "uq_flight_vehicle_under_way",
             "vehicle_id",
             unique=True,
-            sqlite_where=text(_UNDER_WAY_SQL),
-            postgresql_where=text(_UNDER_WAY_SQL),
+            sqlite_where=text(is_one_of("state", sorted(ACTIVE_FLIGHT_STATES))),
         ),
         NEVER_REUSE_IDS,
     )
@@ -289,7 +267,7 @@ class FlightRow(Base, Reported):
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="RESTRICT"), index=True)
     trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="RESTRICT"), index=True)
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
-    state: Mapped[FlightState] = mapped_column(state_type(FlightState))
+    state: Mapped[FlightState]
     mode: Mapped[FlightMode] = mapped_column(String, default="fly", server_default="fly")
     gains: Mapped[GainsJson]
     read_back: Mapped[GainsJson | None]
@@ -317,8 +295,6 @@ class ProposalRow(Base, Reported):
     """A strategy's proposal from one history; stale as soon as the campaign's history has another digest."""
 
     topic = "proposal"
-    __tablename__ = "proposal"
-
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     history_digest: Mapped[str]
     kind: Mapped[ProposalKind] = mapped_column(String)
@@ -344,11 +320,10 @@ class JobRow(Base, Reported):
     """
 
     topic = "job"
-    __tablename__ = "job"
     __table_args__ = (state_check(JobState), Index("ix_job_state_id", "state", "id"), NEVER_REUSE_IDS)
 
     kind: Mapped[str]
-    state: Mapped[JobState] = mapped_column(state_type(JobState))
+    state: Mapped[JobState]
     campaign_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     problem: Mapped[JsonObject | None]
     order: Mapped[JsonObject | None]
@@ -365,8 +340,6 @@ class JobRow(Base, Reported):
 
 class EventRow(Base, Numbered):
     """The outbox: what changed, in order."""
-
-    __tablename__ = "event"
 
     topic: Mapped[str]
     entity_id: Mapped[int]

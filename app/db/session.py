@@ -1,4 +1,5 @@
-"""Connections and transactions: SQLite with a write-ahead log, one transaction per request or task.
+"""Connections and transactions: SQLite with a write-ahead log, one transaction per request or task, and a request that
+is sent again is carried out once.
 
 Writers begin with BEGIN IMMEDIATE. A transaction that starts as a reader and then writes can fail midway because
 another connection wrote in between; one that takes the write lock first waits for it at its start instead.
@@ -8,21 +9,23 @@ import sqlite3
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import Final, TypeVar
 
+from pydantic import BaseModel
 from pydantic_core import from_json
-from sqlalchemy import Connection, Engine, create_engine, event
-from sqlalchemy.engine import URL
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy import URL, Connection, Engine, create_engine, delete, event, exc
 from sqlalchemy.orm import Session, sessionmaker
-from sqlalchemy.pool import ConnectionPoolEntry
 
-from app.common.errors import StorageError
+from app.common.errors import KeyReusedError, Problem, StorageError
 from app.core.clock import Clock
 from app.db import outbox
+from app.db.models import IdempotencyRow
+from app.db.types import utc_now
 
 T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
 
 _BUSY_TIMEOUT_MS: Final = 5000
 _BEGIN: Final = "gainline_begin"
@@ -33,6 +36,17 @@ def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
 
     Without `foreign_keys` a migration can rebuild a table without deleting the rows that refer to it.
     """
+
+    def prepare(connection: sqlite3.Connection, _entry: object) -> None:
+        connection.isolation_level = None  # the "begin" event begins transactions, not the driver
+        for pragma in (
+            "journal_mode = WAL",
+            "synchronous = FULL",  # the spool deletes a record once it is committed
+            f"foreign_keys = {'ON' if foreign_keys else 'OFF'}",
+            f"busy_timeout = {_BUSY_TIMEOUT_MS}",
+        ):
+            connection.execute(f"PRAGMA {pragma}")
+
     engine = create_engine(
         URL.create("sqlite+pysqlite", database=str(database_file)),
         connect_args={"check_same_thread": False},
@@ -40,9 +54,7 @@ def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
         pool_size=8,
         max_overflow=40,
     )
-    event.listen(engine, "connect", _on_connect)
-    if not foreign_keys:
-        event.listen(engine, "connect", _without_foreign_keys)
+    event.listen(engine, "connect", prepare)
     event.listen(engine, "begin", _on_begin)
     return engine
 
@@ -57,21 +69,6 @@ def _read_json(text: str | bytes) -> object:
         return from_json(text)
     except ValueError as error:
         raise sqlite3.DatabaseError("a row holds malformed JSON") from error
-
-
-def _on_connect(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> None:
-    connection.isolation_level = None  # the "begin" event begins transactions, not the driver
-    for pragma in (
-        "journal_mode = WAL",
-        "synchronous = FULL",  # the spool deletes a record once it is committed
-        "foreign_keys = ON",
-        f"busy_timeout = {_BUSY_TIMEOUT_MS}",
-    ):
-        connection.execute(f"PRAGMA {pragma}")
-
-
-def _without_foreign_keys(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> None:
-    connection.execute("PRAGMA foreign_keys = OFF")
 
 
 def _on_begin(connection: Connection) -> None:
@@ -104,6 +101,30 @@ class Database:
         self.engine.dispose()
 
 
+KEPT_ANSWERS: Final = timedelta(days=7)
+
+
+def carry_out_once(session: Session, key: str, fingerprint: str, answer: type[M], work: Callable[[Session], M]) -> M:
+    """Call `work`, or return its stored answer for this key: the first answer to a request is stored in the transaction
+    that carried it out.
+
+    The session must hold the write lock, so that two requests with one key run one after another. Raises KeyReusedError
+    when the key came with another request.
+    """
+    if (known := session.get(IdempotencyRow, key)) is not None:
+        if known.fingerprint != fingerprint:
+            raise KeyReusedError(
+                f"The idempotency key {key!r} has already been used for another request.",
+                hint="Use a new key for every operation, and the same key only to repeat an identical request.",
+                problems=(Problem("Idempotency-Key", "belongs to another request"),),
+            )
+        return answer.model_validate_json(known.answer)
+    session.execute(delete(IdempotencyRow).where(IdempotencyRow.created_at < utc_now() - KEPT_ANSWERS))
+    result = work(session)
+    session.add(IdempotencyRow(key=key, fingerprint=fingerprint, answer=result.model_dump_json()))
+    return result
+
+
 RETRY_S: Final = 1.0
 
 
@@ -128,19 +149,12 @@ def translated(database_file: Path) -> Iterator[None]:
     """Raise StorageError for driver errors that a person can do something about; let the others pass."""
     try:
         yield
-    except (DBAPIError, sqlite3.Error) as error:
-        if (known := _storage_error(error, database_file)) is not None:
-            raise known from error
+    except (exc.DBAPIError, sqlite3.Error) as error:
+        message = str(error.orig if isinstance(error, exc.DBAPIError) else error).lower()
+        for reason, (happened, hint) in _TROUBLES.items():
+            if reason in message:
+                raise StorageError(happened.format(file=database_file), hint=hint.format(file=database_file)) from error
         raise
-
-
-def _storage_error(error: DBAPIError | sqlite3.Error, database_file: Path) -> StorageError | None:
-    """StorageError for a driver's error, or None when it is of another kind."""
-    message = str(error.orig if isinstance(error, DBAPIError) else error).lower()
-    for reason, (happened, hint) in _TROUBLES.items():
-        if reason in message:
-            return StorageError(happened.format(file=database_file), hint=hint.format(file=database_file))
-    return None
 
 
 _DAMAGED: Final = (

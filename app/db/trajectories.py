@@ -7,7 +7,7 @@ The checksum is the SHA-256 of the column names, a NUL, and the plain float32 by
 """
 
 import hashlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Final
@@ -116,10 +116,8 @@ def recorded(session: Session, campaign_id: int | None = None) -> Sequence[Trial
     wanted = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
     if campaign_id is not None:
         wanted = wanted.where(TrialRow.campaign_id == campaign_id)
-    large = (TrialRow.gate, TrialRow.curve, TrialRow.settings)
-    return session.scalars(
-        wanted.options(*(defer(column) for column in large)).order_by(TrialRow.campaign_id, TrialRow.number)
-    ).all()
+    lean = wanted.options(defer(TrialRow.gate), defer(TrialRow.curve), defer(TrialRow.settings))
+    return session.scalars(lean.order_by(TrialRow.campaign_id, TrialRow.number)).all()
 
 
 def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
@@ -171,8 +169,19 @@ def is_intact(row: TrajectoryRow) -> bool:
 
 
 def damaged_trials(session: Session, campaign_id: int | None = None) -> list[TrialRow]:
-    """Trials of one campaign, or of all, whose record is damaged; by campaign and number."""
-    return [row for row, record in _recorded(session, campaign_id) if not is_intact(record)]
+    """Trials of one campaign, or of all, whose record is damaged; by campaign and number.
+
+    The records are loaded in batches because all of them may not fit into memory.
+    """
+    damaged: list[TrialRow] = []
+    rows = recorded(session, campaign_id)
+    for first in range(0, len(rows), _AT_ONCE):
+        some = {row.trajectory_id: row for row in rows[first : first + _AT_ONCE] if row.trajectory_id is not None}
+        records = samples_of(session, some)
+        damaged += [row for identity, row in some.items() if not is_intact(records[identity])]
+        for record in records.values():
+            session.expire(record, ["data"])
+    return damaged
 
 
 def require_intact(database_file: Path) -> None:
@@ -195,16 +204,3 @@ def refused_for(damaged: Sequence[TrialRow], what: str) -> StorageError:
         "the database unchanged, stop Gainline and copy gainline.sqlite3.",
         problems=tuple(Problem(name, "its record does not match its checksum") for name in names),
     )
-
-
-def _recorded(session: Session, campaign_id: int | None) -> Iterator[tuple[TrialRow, TrajectoryRow]]:
-    """Trials with their records, loaded in batches because all of them may not fit into memory."""
-    rows = recorded(session, campaign_id)
-    for first in range(0, len(rows), _AT_ONCE):
-        some = rows[first : first + _AT_ONCE]
-        records = samples_of(session, [row.trajectory_id for row in some if row.trajectory_id is not None])
-        for row in some:
-            if row.trajectory_id is not None:
-                yield row, records[row.trajectory_id]
-        for record in records.values():
-            session.expire(record, ["data"])

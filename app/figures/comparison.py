@@ -11,7 +11,6 @@ from app.figures.base import Card, Table, Trace, literal, reading, ready, scatte
 from app.figures.data import Curve, Scored
 from app.figures.overlays import off_scale
 from app.figures.scale import span_around, thin_by_bends, thinned
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 600
 TABLE_ROWS: Final = 34
@@ -51,7 +50,7 @@ class ComparisonFigure:
     """
 
     data: ComparisonData
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "comparing"
     title: ClassVar[str] = "Curves compared"
 
@@ -59,18 +58,33 @@ class ComparisonFigure:
         return None if self._recorded() else "None of these flights has a record."
 
     def compute(self) -> Card:
-        palette, recorded = PALETTES[self.theme], self._recorded()
+        palette, recorded = theme.PALETTES[self.theme_name], self._recorded()
         low, high, outside = span_around(self.data.set_point.values, [curve.values for *_, curve in recorded])
         traces = [self._set_point(palette)]
         traces += [self._flight(palette, index, flight, curve) for index, flight, curve in recorded]
         traces += [
             self._difference(palette, index, flight, curve) for index, flight, curve in self._differences(recorded)
         ]
-        for _, flight, curve in [recorded[place] for place in outside]:
-            label, unit = flight.label, self.data.output_unit
-            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.trial_id, text=label, unit=unit))
-        layout = self._layout(palette, low, high)
-        return ready(self, traces, layout, summary=self._summary(len(outside)), table=self._table(recorded))
+        traces += [
+            off_scale(
+                flight.label,
+                curve,
+                low,
+                high,
+                palette.bad,
+                trial=flight.trial_id,
+                text=flight.label,
+                unit=self.data.output_unit,
+            )
+            for _, flight, curve in (recorded[place] for place in outside)
+        ]
+        return ready(
+            self,
+            traces,
+            self._layout(palette, low, high),
+            summary=self._summary(len(outside)),
+            table=self._table(recorded),
+        )
 
     def _recorded(self) -> list[Drawn]:
         return [
@@ -86,7 +100,7 @@ class ComparisonFigure:
             return []
         return [(index, flight, _less(curve, first)) for index, flight, curve in recorded if index > 0]
 
-    def _layout(self, palette: Palette, low: float, high: float) -> dict[str, object]:
+    def _layout(self, palette: theme.Palette, low: float, high: float) -> dict[str, object]:
         data, end = self.data, float(self.data.set_point.time_s[-1])
         first = data.flights[0].label
         return theme.layout(
@@ -106,7 +120,7 @@ class ComparisonFigure:
             uirevision="comparing",
         )
 
-    def _set_point(self, palette: Palette) -> Trace:
+    def _set_point(self, palette: theme.Palette) -> Trace:
         return scatter(
             "Set point",
             thin_by_bends(self.data.set_point.time_s, self.data.set_point.values),
@@ -115,26 +129,26 @@ class ComparisonFigure:
             legendrank=1100,
         )
 
-    def _flight(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
+    def _flight(self, palette: theme.Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
         error = "" if flight.error is None else f"<br>error {short(flight.error)} {self.data.error_unit}"
         return scatter(
             literal(_shortened(f"{flight.label} · {flight.name}")),
             thinned(curve.time_s, curve.values, POINTS),
             role="flight",
             about={"trial": flight.trial_id},
-            line=_pen(palette, index),
+            line=pen(palette, index),
             legendgroup=flight.label,
             hovertemplate=reading(f"{flight.label} · {literal(flight.name)}", self.data.output_unit, error),
         )
 
-    def _difference(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
+    def _difference(self, palette: theme.Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
         name = f"{flight.label} minus {self.data.flights[0].label}"
         return scatter(
             name,
             thinned(curve.time_s, curve.values, POINTS),
             role="difference",
             about={"trial": flight.trial_id},
-            line=_pen(palette, index),
+            line=pen(palette, index),
             legendgroup=flight.label,
             yaxis="y2",
             showlegend=False,
@@ -168,16 +182,11 @@ class ComparisonFigure:
         return table_of_curves(seconds.tolist(), 2, data.output_unit, named)
 
 
-def line_style(palette: Palette, index: int) -> tuple[str, str]:
-    """Colour and dash of the flight at an index; neighbours differ in both."""
+def pen(palette: theme.Palette, index: int) -> dict[str, object]:
+    """Line of the flight at an index; neighbours differ in colour and dash."""
     teal, orange, blue = palette.gains
     colours = (palette.ink, teal, orange, blue, palette.prediction, palette.bad)
-    return colours[index % len(colours)], DASHES[(index + index // len(colours)) % len(DASHES)]
-
-
-def _pen(palette: Palette, index: int) -> dict[str, object]:
-    colour, dash = line_style(palette, index)
-    return theme.line(colour, 2, dash)
+    return theme.line(colours[index % len(colours)], 2, DASHES[(index + index // len(colours)) % len(DASHES)])
 
 
 def _less(curve: Curve, first: Curve) -> Curve:

@@ -161,26 +161,38 @@ class History(Scored):
     @cached_property
     def best(self) -> FlightData | None:
         """The valid flight with the lowest error, the earliest of equals."""
-        return min(self.valid, key=_error, default=None)
+        return min(self.valid, key=lambda flight: (flight.error, flight.number), default=None)
+
+    @property
+    def valid_errors(self) -> list[float]:
+        """Errors of the valid flights, in their order."""
+        return [flight.error for flight in self.valid if flight.error is not None]
 
     @property
     def is_best_of_best_gains(self) -> bool:
         """Whether the best flight has the gains with the best mean, as far as the scatter is known."""
-        if self.best is None or self.noise is None or not self.noise.best_numbers:
-            return True
-        return self.best.number in self.noise.best_numbers
+        known = () if self.noise is None else self.noise.best_numbers
+        return self.best is None or not known or self.best.number in known
 
     @property
-    def latest(self) -> FlightData | None:
-        return self.flights[-1] if self.flights else None
+    def next_flights(self) -> tuple[NextFlight, ...]:
+        """The proposed flight, if there is one."""
+        return () if self.proposal is None else (self.proposal,)
 
+    @property
+    def last_number(self) -> int:
+        """The highest flight number in a figure, including the proposed flight."""
+        return max((flight.number for flight in (*self.flights, *self.next_flights)), default=1)
 
-def _error(flight: FlightData) -> float:
-    assert flight.error is not None
-    return flight.error
-
-
-def last_number(history: History) -> int:
-    """The highest flight number in a figure, including the proposed flight."""
-    numbers = [flight.number for flight in history.flights]
-    return max([*numbers, history.proposal.number] if history.proposal is not None else numbers, default=1)
+    def standing_of(self, flight: FlightData) -> str:
+        """The standing of a flight among those of its campaign, which decides how its curve is drawn: `best`, `latest`,
+        `baseline`, `earlier`, `invalid` or `unjudged`."""
+        if flight.outcome == "not yet reviewed":
+            return "unjudged"
+        if flight.outcome != "valid":
+            return "invalid"
+        if flight is self.best:
+            return "best"
+        if flight is not self.flights[-1]:
+            return "earlier"
+        return "baseline" if len(self.flights) > 1 and flight.gains == self.flights[0].gains else "latest"

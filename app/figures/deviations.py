@@ -10,7 +10,6 @@ from app.figures import theme
 from app.figures.base import Trace
 from app.figures.data import Curve, FlightData, Range
 from app.figures.overlays import Side, leaves_upward, off_scale, part_off_scale, signed
-from app.figures.theme import Palette
 
 FINEST: Final = 0.005
 """The smallest range of the panel for steps, as a share of the set point."""
@@ -88,7 +87,7 @@ def scored_deviation_limit(curve: Curve, target: Curve, set_point: Curve) -> flo
 
 
 def off_scale_deviations(
-    palette: Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, unit: str, window: Range
+    palette: theme.Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, unit: str, window: Range
 ) -> list[Trace]:
     """Marks at the edge of the panel for flights that leave it after the climb, at their largest deviation in the
     visible time range `window`.
@@ -158,7 +157,7 @@ def _overlaps(one: Range, other: Range) -> bool:
     return one.low < other.high and other.low < one.high
 
 
-def _trace(palette: Palette, mark: _Mark, label: _Label | None, limit: float, unit: str) -> Trace:
+def _trace(palette: theme.Palette, mark: _Mark, label: _Label | None, limit: float, unit: str) -> Trace:
     return off_scale(
         "" if label is None else ", ".join(map(str, sorted(label.numbers))),
         mark.deviation,
@@ -175,7 +174,7 @@ def _trace(palette: Palette, mark: _Mark, label: _Label | None, limit: float, un
     )
 
 
-def deviation_axis(palette: Palette, limit: float, unit: str, **more: object) -> dict[str, object]:
+def deviation_axis(palette: theme.Palette, limit: float, unit: str, **more: object) -> dict[str, object]:
     """The ordinate of the panel, from −limit to limit."""
     return theme.axis(
         palette,

@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any, ClassVar, Final
 
 from app.core import formatting
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.data import AnyFlight, FlightData, History, Range, last_number
+from app.figures.data import AnyFlight, History, Range
 from app.figures.overlays import MANY, off_scale_traces
-from app.figures.scale import RobustRange, robust_range
-from app.figures.theme import PALETTES, Palette, ThemeName
+from app.figures.scale import robust_top
 
 FEW: Final = 8
 """Up to this number of flights, every error is labelled."""
@@ -31,7 +31,7 @@ class ErrorsFigure:
     """
 
     history: History
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "errors"
     title: ClassVar[str] = "Error per flight"
 
@@ -45,122 +45,125 @@ class ErrorsFigure:
         return "The error of each flight appears here after the first valid flight."
 
     def compute(self) -> Card:
-        palette, history = PALETTES[self.theme], self.history
-        last, span, strip = last_number(history), self._span(), self._strip(palette)
+        palette, history = theme.PALETTES[self.theme_name], self.history
+        top, outside = self._top()
+        strip = self._strip(palette)
         traces = [
-            *self._noise(palette, last),
+            *self._noise(palette),
             self._best_so_far(palette),
-            *self._threshold(palette, last),
-            *self._intervals(palette, span.high),
-            *self._predicted(palette, 1.08 * span.high),
+            *self._threshold(palette),
+            *self._intervals(palette, top),
+            *self._predicted(palette, 1.08 * top),
             *self._repeats(palette),
             *self._measured(palette),
             *self._not_valid(palette),
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
-        outside = [scored[index] for index in span.outside]
-        traces += off_scale_traces(palette, outside, span.high, history.error_unit, last=last, crowded=self._is_crowded)
+        traces += off_scale_traces(
+            palette,
+            [scored[index] for index in outside],
+            top,
+            history.error_unit,
+            last=history.last_number,
+            crowded=self._is_crowded,
+        )
         layout = theme.layout(
             palette,
             xaxis=theme.axis(
                 palette,
                 "Flight",
                 anchor="y2" if strip else "y",
-                **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]},
+                **theme.flight_ticks(history.last_number) | {"range": [0.5, self._right]},
             ),
             yaxis=theme.axis(
                 palette,
                 f"Error ({history.error_unit})",
                 domain=[STRIP + _STRIP_GAP if strip else 0.0, 1.0],
-                range=[0, 1.08 * span.high],
+                range=[0, 1.08 * top],
                 nticks=6,
             ),
             **strip,
             margin={**theme.MARGIN_PX, "l": 60, "r": 30},
-            annotations=self._labels(palette, span.high),
+            annotations=self._labels(palette, top),
             uirevision="errors",
         )
         return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _strip(self, palette: Palette) -> dict[str, object]:
+    def _strip(self, palette: theme.Palette) -> dict[str, object]:
         """The ordinate of the strip below the errors; empty if every flight has an error."""
         if all(flight.error is not None for flight in self.history.flights):
             return {}
-        strip = theme.axis(
-            palette,
-            domain=[0.0, STRIP],
-            range=[-1, 1],
-            tickvals=[0],
-            ticktext=["no error"],
-            fixedrange=True,
-            automargin=False,
-        )
-        return {"yaxis2": strip}
+        return {
+            "yaxis2": theme.axis(
+                palette,
+                domain=[0.0, STRIP],
+                range=[-1, 1],
+                tickvals=[0],
+                ticktext=["no error"],
+                fixedrange=True,
+                automargin=False,
+            )
+        }
 
-    def _span(self) -> RobustRange:
-        """Range up to the first flight's error, every other one that is no outlier, and what was or is predicted."""
+    @property
+    def _right(self) -> float:
+        """Right end of the axis of flights."""
+        return self.history.last_number + 0.95
+
+    def _top(self) -> tuple[float, list[int]]:
+        """Range up to the first flight's error, every other one that is no outlier, and what was or is predicted; and
+        the indices of the outliers."""
         errors = [flight.error for flight in self.history.flights if flight.error is not None]
-        first = [flight.error for flight in self.history.valid[:1] if flight.error is not None]
         expected = [interval.high for _, interval in self._expected()]
         expected += [value for _, value in self._predictions()]
-        high = max(first, default=min(errors))
-        return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
+        high = max(self.history.valid_errors[:1], default=min(errors))
+        return robust_top(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
 
-    def _measured(self, palette: Palette) -> Iterator[Trace]:
-        flights, best = self.history.valid, self.history.best
+    def _measured(self, palette: theme.Palette) -> Iterator[Trace]:
+        flights, best, noise = self.history.valid, self.history.best, self.history.noise
         if not flights:
             return
-        colours = [palette.best if flight is best else palette.ink for flight in flights]
         size = 4 if self._is_crowded else 8
+        spread = "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
+        bars: dict[str, Any] = {}
+        if noise is not None and not self._is_crowded:
+            bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
+            bars["error_y"] = bar
         yield scatter(
             "Measured",
-            ([flight.number for flight in flights], [_rounded(flight.error) for flight in flights]),
+            ([flight.number for flight in flights], [round(error, 6) for error in self.history.valid_errors]),
             role="measured",
             mode="markers",
             cliponaxis=False,
-            **self._error_bars(palette),
+            **bars,
             marker=theme.solid(
-                colours,
+                [palette.best if flight is best else palette.ink for flight in flights],
                 size=[13 if flight is best else size for flight in flights],
                 symbol=["star" if flight is best else "circle" for flight in flights],
             ),
-            hovertemplate=f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
+            hovertemplate=f"<b>Flight %{{x}}</b><br>error {self._reading}{spread}<extra></extra>",
         )
 
     @property
     def _is_crowded(self) -> bool:
         return len(self.history.flights) > MANY
 
-    @property
-    def _scatter(self) -> str:
-        noise = self.history.noise
-        return "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
-
-    def _error_bars(self, palette: Palette) -> dict[str, Any]:
-        """One standard deviation of a single flight, up and down."""
-        noise = self.history.noise
-        if noise is None or self._is_crowded:
-            return {}
-        bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
-        return {"error_y": bar}
-
-    def _noise(self, palette: Palette, last: int) -> Iterator[Trace]:
+    def _noise(self, palette: theme.Palette) -> Iterator[Trace]:
         """Range in which another flight of the best gains would lie: a result inside it is not significant."""
         noise = self.history.noise
         if noise is None or noise.around_best is None:
             return
         low, high = round(max(0.0, noise.around_best.low), 6), round(noise.around_best.high, 6)
-        right = last + 0.95
         yield scatter(
             "Scatter of best" if noise.repeats else "Scatter (prior)",
-            ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
+            ([0.5, self._right, self._right, 0.5, 0.5], [low, low, high, high, low]),
             role="noise",
             line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
             fill="toself",
             fillcolor=theme.with_opacity(palette.best, 0.12),
         )
 
-    def _repeats(self, palette: Palette) -> Iterator[Trace]:
+    def _repeats(self, palette: theme.Palette) -> Iterator[Trace]:
         """Mean of flights with the same gains, with its standard error, beside the last of them."""
         repeats = () if self.history.noise is None else self.history.noise.repeats
         if not repeats:
@@ -188,7 +191,7 @@ class ErrorsFigure:
             hovertemplate="<b>%{text}</b><extra></extra>",
         )
 
-    def _intervals(self, palette: Palette, top: float) -> Iterator[Trace]:
+    def _intervals(self, palette: theme.Palette, top: float) -> Iterator[Trace]:
         """Predicted interval of each flight's error, or only the next one's if there are many.
 
         A bar behind the diamond of the prediction, cut at the edge.
@@ -219,13 +222,12 @@ class ErrorsFigure:
 
     def _predicted_flights(self) -> list[AnyFlight]:
         """The flights whose predictions are drawn."""
-        flown = () if self._is_crowded else self.history.flights
-        return [*flown, *([] if self.history.proposal is None else [self.history.proposal])]
+        return [*(() if self._is_crowded else self.history.flights), *self.history.next_flights]
 
     def _expected(self) -> list[tuple[int, Range]]:
         return [(each.number, each.interval) for each in self._predicted_flights() if each.interval is not None]
 
-    def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
+    def _labels(self, palette: theme.Palette, top: float) -> list[dict[str, object]]:
         """The error beside each mark, clear of the steps; with many flights only the best."""
         flights, best = self.history.valid, self.history.best
         return [
@@ -242,70 +244,60 @@ class ErrorsFigure:
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _not_valid(self, palette: Palette) -> list[Trace]:
+    def _not_valid(self, palette: theme.Palette) -> Iterator[Trace]:
         """Marks for flights that do not count and those without a review: at their error, or in the strip."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet reviewed"}]
         unjudged = [flight for flight in flights if flight.outcome == "not yet reviewed"]
-        marked = (
+        for role, marked, symbol, colour in (
             ("not counted", uncounted, "x-thin", palette.bad),
             ("not yet reviewed", unjudged, "circle-open", palette.dim),
-        )
-        return [
-            trace
-            for role, marks, symbol, colour in marked
-            for trace in self._marks(role, marks, {"symbol": symbol, "color": colour, "line": {"color": colour}})
-        ]
+        ):
+            scored = [flight for flight in marked if flight.error is not None]
+            others = [flight for flight in marked if flight.error is None]
+            errors = [round(flight.error, 6) for flight in scored if flight.error is not None]
+            for axis, placed, heights, note in (
+                ("y", scored, errors, f"error {self._reading}"),
+                ("y2", others, [0] * len(others), "no error"),
+            ):
+                if placed:
+                    yield scatter(
+                        role.capitalize(),
+                        ([flight.number for flight in placed], heights),
+                        role=role,
+                        mode="markers",
+                        text=[flight.outcome for flight in placed],
+                        marker={"symbol": symbol, "color": colour, "line": {"color": colour, "width": 2}, "size": 10},
+                        cliponaxis=False,
+                        yaxis=axis,
+                        legendgroup=role,
+                        showlegend=placed is scored or not scored,
+                        hovertemplate=f"<b>Flight %{{x}}, %{{text}}</b><br>{note}<extra></extra>",
+                    )
 
-    def _marks(self, role: str, flights: list[FlightData], style: dict[str, Any]) -> list[Trace]:
-        scored = [flight for flight in flights if flight.error is not None]
-        others = [flight for flight in flights if flight.error is None]
-        places = (
-            ("y", scored, [_rounded(flight.error) for flight in scored], f"error {self._reading}"),
-            ("y2", others, [0] * len(others), "no error"),
-        )
-        return [
-            scatter(
-                role.capitalize(),
-                ([flight.number for flight in placed], heights),
-                role=role,
-                mode="markers",
-                text=[flight.outcome for flight in placed],
-                marker={**style, "size": 10, "line": {**style["line"], "width": 2}},
-                cliponaxis=False,
-                yaxis=axis,
-                legendgroup=role,
-                showlegend=placed is scored or not scored,
-                hovertemplate=f"<b>Flight %{{x}}, %{{text}}</b><br>{note}<extra></extra>",
-            )
-            for axis, placed, heights, note in places
-            if placed
-        ]
-
-    def _best_so_far(self, palette: Palette) -> Trace:
-        best = best_so_far(self.history)
+    def _best_so_far(self, palette: theme.Palette) -> Trace:
         numbers = [flight.number for flight in self.history.valid]
         return scatter(
             "Best so far",
-            (numbers, [round(value, 6) for value in best]),
+            (numbers, [round(value, 6) for value in accumulate(self.history.valid_errors, min)]),
             role="best so far",
             line={**theme.line(palette.best, 2), "shape": "hv"},
         )
 
-    def _threshold(self, palette: Palette, last: int) -> Iterator[Trace]:
+    def _threshold(self, palette: theme.Palette) -> Iterator[Trace]:
         """The error below which the stop rule counts a further flight as an improvement."""
-        best, improvement = self.history.best, self.history.stop_improvement
-        if best is None or best.error is None or improvement is None:
+        errors, improvement = self.history.valid_errors, self.history.stop_improvement
+        if not errors or improvement is None:
             return
-        value = round(best.error * (1 - improvement), 6)
+        value = round(min(errors) * (1 - improvement), 6)
         yield scatter(
             f"To beat: {formatting.short(value)}",
-            ([0.5, last + 0.95], [value, value]),
+            ([0.5, self._right], [value, value]),
             role="threshold",
             line=theme.line(palette.dim, 1.25, "dot"),
         )
 
-    def _predicted(self, palette: Palette, top: float) -> Iterator[Trace]:
+    def _predicted(self, palette: theme.Palette, top: float) -> Iterator[Trace]:
         """The predicted error of each flight, or only the next one's if there are many: a diamond, or where it is off
         the scale, a triangle at the edge."""
         known = self._predictions()
@@ -335,17 +327,18 @@ class ErrorsFigure:
         return [(number, round(value, 6)) for number, value in pairs if value is not None]
 
     def _summary(self) -> str:
-        best, valid = self.history.best, self.history.valid
-        if best is None or best.error is None:
+        best, errors = self.history.best, self.history.valid_errors
+        if best is None:
             return "No valid flight yet."
-        first = valid[0].error
-        assert first is not None
-        share = "" if best is valid[0] else f", {100 * (1 - best.error / first):.0f} % below flight {valid[0].number}"
-        return f"Best error {formatting.short(best.error)} {self.history.error_unit} in flight {best.number}{share}."
+        first = self.history.valid[0]
+        lowest = min(errors)
+        share = "" if best is first else f", {100 * (1 - lowest / errors[0]):.0f} % below flight {first.number}"
+        return f"Best error {formatting.short(lowest)} {self.history.error_unit} in flight {best.number}{share}."
 
     def _table(self) -> Table:
-        unit, noise, proposal = self.history.error_unit, self.history.noise, self.history.proposal
-        running = dict(zip((flight.number for flight in self.history.valid), best_so_far(self.history), strict=True))
+        unit, noise = self.history.error_unit, self.history.noise
+        best_so_far = accumulate(self.history.valid_errors, min)
+        running = dict(zip((flight.number for flight in self.history.valid), best_so_far, strict=True))
         rows: list[tuple[Cell, ...]] = [
             (
                 flight.number,
@@ -358,10 +351,11 @@ class ErrorsFigure:
             )
             for flight in self.history.flights
         ]
-        if proposal is not None and proposal.predicted_error is not None:
-            rows.append(
-                (proposal.number, "proposed", None, None, proposal.predicted_error, *_ends(proposal.interval), None)
-            )
+        rows += [
+            (flight.number, "proposed", None, None, flight.predicted_error, *_ends(flight.interval), None)
+            for flight in self.history.next_flights
+            if flight.predicted_error is not None
+        ]
         return Table(
             (
                 Column("flight", "Flight", digits=0),
@@ -377,18 +371,5 @@ class ErrorsFigure:
         )
 
 
-def best_so_far(history: History) -> list[float]:
-    """Running minimum of the error, one value per valid flight."""
-    running: list[float] = []
-    for flight in history.valid:
-        assert flight.error is not None
-        running.append(min([flight.error, *running[-1:]]))
-    return running
-
-
 def _ends(interval: Range | None) -> tuple[float | None, float | None]:
     return (None, None) if interval is None else (interval.low, interval.high)
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 6)

@@ -15,7 +15,6 @@ from app.figures.data import Band, Curve, Range, Scored
 from app.figures.deviations import deviation_axis, deviation_of, is_step, scored_deviation_limit, scored_part
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 1200
 TABLE_ROWS: Final = 34
@@ -75,38 +74,37 @@ class FlightFigure:
     """
 
     record: FlightRecordData
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "flight"
     title: ClassVar[str] = "Flight record"
 
     def not_ready(self) -> str | None:
-        if self.record.curve is None or len(self.record.curve.time_s) == 0:
-            if self.record.is_over:
-                return "No record of this flight was received."
-            return "There is no record of this flight yet."
-        return None
+        if self.record.curve is not None and len(self.record.curve.time_s):
+            return None
+        return (
+            "No record of this flight was received."
+            if self.record.is_over
+            else "There is no record of this flight yet."
+        )
 
     def compute(self) -> Card:
-        palette, curve = PALETTES[self.theme], self.record.curve
+        palette, record, curve = theme.PALETTES[self.theme_name], self.record, self.record.curve
         assert curve is not None
-        traces = [*self._outputs(palette, curve), *self._deviation(palette, curve), *self._channels(palette)]
+        traces = [
+            *band_traces(palette, record.band),
+            *self._context(palette),
+            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", record.output_unit),
+            *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
+            *self._deviation(palette, curve),
+            *self._channels(palette),
+        ]
         return ready(self, traces, self._layout(palette, curve), summary=self._summary(), table=self._table(curve))
 
     @property
     def _has_deviation(self) -> bool:
         return is_step(self.record.set_point)
 
-    def _outputs(self, palette: Palette, curve: Curve) -> list[Trace]:
-        """The flight with its context curves, and its glitches on top."""
-        record = self.record
-        return [
-            *band_traces(palette, record.band),
-            *self._context(palette),
-            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", record.output_unit),
-            *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
-        ]
-
-    def _deviation(self, palette: Palette, curve: Curve) -> Iterator[Trace]:
+    def _deviation(self, palette: theme.Palette, curve: Curve) -> Iterator[Trace]:
         record = self.record
         if not self._has_deviation:
             return
@@ -114,7 +112,7 @@ class FlightFigure:
         drawn = _line("Deviation", deviation, palette.ink, 1.75, "deviation", record.output_unit)
         yield {**drawn, "yaxis": "y2", "showlegend": False}
 
-    def _channels(self, palette: Palette) -> list[Trace]:
+    def _channels(self, palette: theme.Palette) -> list[Trace]:
         colours = (palette.ink, *palette.gains)
         traces: list[Trace] = []
         for place, panel in enumerate(self.record.panels, start=2 + self._has_deviation):
@@ -128,7 +126,7 @@ class FlightFigure:
                 traces += [one | axis for one in _saturated(palette, next(iter(panel.curves.values())), panel.limits)]
         return traces
 
-    def _layout(self, palette: Palette, curve: Curve) -> dict[str, object]:
+    def _layout(self, palette: theme.Palette, curve: Curve) -> dict[str, object]:
         """The output on top, twice as high as each panel below it."""
         record, goal = self.record, self.record.set_point
         low, high, _ = robust_span(
@@ -177,28 +175,21 @@ class FlightFigure:
             **axes,
         )
 
-    def _context(self, palette: Palette) -> list[Trace]:
+    def _context(self, palette: theme.Palette) -> list[Trace]:
+        """What the flight is compared with, as far as it is known."""
         record, unit = self.record, self.record.output_unit
-        drawn = [_line("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot")]
-        if record.reference is not None:
-            drawn.append(
-                _line(
-                    "Reference",
-                    scored_part(record.reference, record.set_point),
-                    palette.dim,
-                    1.5,
-                    "reference",
-                    None,
-                    "dashdot",
-                )
-            )
-        if record.best is not None:
-            drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
-        if record.predicted is not None:
-            drawn.append(
-                _line(record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash")
-            )
-        return drawn
+        goal = None if record.reference is None else scored_part(record.reference, record.set_point)
+        curves = (
+            ("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot"),
+            ("Reference", goal, palette.dim, 1.5, "reference", None, "dashdot"),
+            (f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit, "solid"),
+            (record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash"),
+        )
+        return [
+            _line(name, curve, colour, width, role, shown, dash)
+            for name, curve, colour, width, role, shown, dash in curves
+            if curve is not None
+        ]
 
     def _summary(self) -> str:
         record = self.record
@@ -230,7 +221,7 @@ def _places(below: int) -> list[list[float]]:
     return [[max(0.0, top - (height if index else _OUTPUT_SHARE * height)), top] for index, top in enumerate(tops)]
 
 
-def _saturated(palette: Palette, command: Curve, limits: Range) -> Iterator[Trace]:
+def _saturated(palette: theme.Palette, command: Curve, limits: Range) -> Iterator[Trace]:
     """Where the command is at a limit between the first and the last time that it is above the lower one, while the
     motors run; no trace if it never is."""
     is_above = command.values > limits.low
@@ -255,7 +246,7 @@ def _saturated(palette: Palette, command: Curve, limits: Range) -> Iterator[Trac
     )
 
 
-def _names(palette: Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
+def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
     """The events' names along their lines: the first at the left of its line, the others at the right, over the curves.
 
     Each one that is near the one before it at the same side is below that.
@@ -273,7 +264,7 @@ def _names(palette: Palette, events: Sequence[FlightEvent], lasts_s: float) -> l
     return names
 
 
-def _note(palette: Palette, note: FlightEvent, bottom: float) -> dict[str, object]:
+def _note(palette: theme.Palette, note: FlightEvent, bottom: float) -> dict[str, object]:
     """The note along its line, upward from the bottom of the output's panel."""
     text = note.name if len(note.name) <= _NOTE_LETTERS else f"{note.name[: _NOTE_LETTERS - 1].rstrip()}…"
     return _along(

@@ -7,9 +7,8 @@ from app.core import formatting
 from app.core.policy import Gain
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, ready, scatter
-from app.figures.data import History, last_number
+from app.figures.data import History
 from app.figures.overlays import MANY
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09
 """Height between two panels as a share of the whole: room for the title of the lower one."""
@@ -25,23 +24,22 @@ class GainsFigure:
     """
 
     history: History
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "gains"
     title: ClassVar[str] = "Gains per flight"
 
     def not_ready(self) -> str | None:
-        if self.history.flights or self.history.proposal is not None:
+        if self.history.flights or self.history.next_flights:
             return None
         return "The gains of each flight appear here once the first ones are proposed."
 
     def compute(self) -> Card:
-        palette, history = PALETTES[self.theme], self.history
+        palette, history = theme.PALETTES[self.theme_name], self.history
         panels = list(enumerate(history.gains, start=1))
         traces = [trace for index, gain in panels for trace in self._panel(palette, index, gain)]
-        last = last_number(history)
         axes: dict[str, object] = {}
         for index, gain in panels:
-            axes |= self._axes(palette, index, gain, last)
+            axes |= self._axes(palette, index, gain)
         layout = theme.layout(
             palette,
             showlegend=False,
@@ -52,9 +50,9 @@ class GainsFigure:
         )
         return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _panel(self, palette: Palette, index: int, gain: Gain) -> list[Trace]:
+    def _panel(self, palette: theme.Palette, index: int, gain: Gain) -> list[Trace]:
         colour = palette.gains[(index - 1) % len(palette.gains)]
-        flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
+        flights, best = self.history.flights, self.history.best
         axes: dict[str, Any] = {**theme.on(index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
         crowded = len(flights) > MANY
@@ -83,35 +81,34 @@ class GainsFigure:
                 "marker": theme.solid(colour, size=13, symbol="star"),
             }
             drawn.append({**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}})
-        if proposal is None:
-            return drawn
-        following = scatter(
-            f"{gain.title}, next",
-            ([proposal.number], [proposal.gains[gain.name]]),
-            role="next",
-            about={"gain": gain.name},
-            mode="markers",
-            marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-            hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
-            **axes,
-        )
-        return [*drawn, following]
+        drawn += [
+            scatter(
+                f"{gain.title}, next",
+                ([following.number], [following.gains[gain.name]]),
+                role="next",
+                about={"gain": gain.name},
+                mode="markers",
+                marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+                hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+                **axes,
+            )
+            for following in self.history.next_flights
+        ]
+        return drawn
 
-    def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
+    def _axes(self, palette: theme.Palette, index: int, gain: Gain) -> dict[str, object]:
         count = len(self.history.gains)
-        values = [flight.gains[gain.name] for flight in self.history.flights]
-        if self.history.proposal is not None:
-            values.append(self.history.proposal.gains[gain.name])
+        values = [flight.gains[gain.name] for flight in (*self.history.flights, *self.history.next_flights)]
         return theme.panel_axes(
             palette,
             (index, count, GAP),
             "Flight",
-            theme.flight_ticks(last),
+            theme.flight_ticks(self.history.last_number),
             range=padded(min(values), max(values), gain),
             nticks=4 if count <= 3 else 3,
         )
 
-    def _names(self, palette: Palette) -> list[dict[str, object]]:
+    def _names(self, palette: theme.Palette) -> list[dict[str, object]]:
         """Name, title and unit of each gain, above its panel; where one would not fit, the titles show under the
         pointer."""
         gains = self.history.gains
@@ -137,17 +134,15 @@ class GainsFigure:
         )
 
     def _table(self) -> Table:
-        rows: list[tuple[str | int | float | None, ...]] = [
-            (str(flight.number), *(flight.gains[gain.name] for gain in self.history.gains))
-            for flight in self.history.flights
-        ]
-        if self.history.proposal is not None:
-            rows.append(("proposed", *(self.history.proposal.gains[gain.name] for gain in self.history.gains)))
+        flown = [(str(flight.number), flight.gains) for flight in self.history.flights]
+        flown += [("proposed", flight.gains) for flight in self.history.next_flights]
         columns = (
             Column("flight", "Flight"),
             *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in self.history.gains),
         )
-        return Table(columns, tuple(rows))
+        return Table(
+            columns, tuple((name, *(gains[gain.name] for gain in self.history.gains)) for name, gains in flown)
+        )
 
 
 def _label(name: str, title: str, gain: Gain) -> str:

@@ -11,10 +11,21 @@ from app.core.policy import Gain, Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.contours import LEGEND, Scale, contour_traces, scale_of
 from app.figures.data import FlightData, History
-from app.figures.landscape_layout import Box, holds, mark_box, number_box, number_position, numbers, padded, to_edge
-from app.figures.theme import PALETTES, Palette, ThemeName
+from app.figures.slices import (
+    LEGEND,
+    Box,
+    Scale,
+    contour_traces,
+    holds,
+    mark_box,
+    number_box,
+    number_position,
+    numbers,
+    padded,
+    scale_of,
+    to_edge,
+)
 
 LONGEST_PATH: Final = 60
 """Largest number of latest flights in the path; the first and the best are always included."""
@@ -52,7 +63,7 @@ class LandscapeFigure:
     history: History
     landscape: Landscape
     search: Search
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     stacked: bool = False
     name: ClassVar[str] = "landscape"
     title: ClassVar[str] = "Error landscape of the model"
@@ -61,14 +72,16 @@ class LandscapeFigure:
         return None if self.landscape.slices else "Nothing to draw: fewer than two gains are free."
 
     def compute(self) -> Card:
-        palette, slices = PALETTES[self.theme], self.landscape.slices
+        palette, slices = theme.PALETTES[self.theme_name], self.landscape.slices
         scale = scale_of(slices)
         traces: list[Trace] = []
         axes: dict[str, object] = {}
         for index, one in enumerate(slices, start=1):
             named = {LEGEND, *(trace["legendgroup"] for trace in traces)}
-            own = self._slice(palette, index, one, scale)
-            traces += [trace | {"showlegend": trace["legendgroup"] not in named} for trace in own]
+            traces += [
+                trace | {"showlegend": trace["legendgroup"] not in named}
+                for trace in self._slice(palette, index, one, scale)
+            ]
             axes |= self._axes(palette, index, one)
         layout = theme.layout(
             palette,
@@ -79,7 +92,7 @@ class LandscapeFigure:
         )
         return ready(self, traces, layout, summary=self._summary(scale), table=self._table())
 
-    def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> Iterator[Trace]:
+    def _slice(self, palette: theme.Palette, index: int, one: Slice, scale: Scale) -> Iterator[Trace]:
         """All traces of a slice: the contours, then what lies over them."""
         yield from contour_traces(palette, index, one, scale, self.history.error_unit, self._taken(one))
         draw = partial(_marks, index, one)
@@ -103,12 +116,12 @@ class LandscapeFigure:
 
     def _taken(self, one: Slice) -> list[Box]:
         """The room of all marks and numbers in a slice."""
-        shown, proposal = self._shown(), self.history.proposal
-        marked = [*(flight.gains for flight in shown), *(step.gains for step in self.search.tried)]
-        marked += [] if proposal is None else [proposal.gains]
+        shown = self._shown()
+        marked = [flight.gains for flight in (*shown, *self.history.next_flights)]
         texts = zip(shown, self._texts(one), strict=True)
         return [
             *(mark_box(one, gains) for gains in marked),
+            *(mark_box(one, step.gains) for step in self.search.tried),
             *(number_box(one, flight.gains, text) for flight, text in texts if text),
         ]
 
@@ -123,7 +136,7 @@ class LandscapeFigure:
         kept = [flight for flight in earlier if flight is earlier[0] or flight is self.history.best]
         return [*kept, *self.history.flights[-LONGEST_PATH:]]
 
-    def _path(self, palette: Palette, one: Slice, draw: Callable[..., Trace]) -> Iterator[Trace]:
+    def _path(self, palette: theme.Palette, one: Slice, draw: Callable[..., Trace]) -> Iterator[Trace]:
         flights, best = self._shown(), self.history.best
         if not flights:
             return
@@ -149,34 +162,29 @@ class LandscapeFigure:
             hovertext=[_hover_text(flight, unit) for flight in flights],
         )
         if best is not None:
-            edge = {"width": 1.5, "color": palette.surface}
             yield draw(
                 [best.gains],
                 "best",
                 f"Best, flight {best.number}",
                 "markers",
-                marker=theme.solid(palette.best, size=_STAR_PX, symbol="star", line=edge),
+                marker=_edged(palette, palette.best, size=_STAR_PX, symbol="star"),
                 hovertext=[_hover_text(best, unit)],
             )
 
-    def _proposed(self, palette: Palette, draw: Callable[..., Trace]) -> Iterator[Trace]:
-        proposal = self.history.proposal
-        if proposal is None:
-            return
-        prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
-        edge = {"width": 1.5, "color": palette.surface}
-        yield draw(
-            [proposal.gains],
-            "proposed",
-            f"Next, flight {proposal.number}",
-            "markers",
-            marker=theme.solid(palette.prediction, size=13, symbol="diamond", line=edge),
-            hovertext=[
-                f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
-            ],
-        )
+    def _proposed(self, palette: theme.Palette, draw: Callable[..., Trace]) -> Iterator[Trace]:
+        unit = self.history.error_unit
+        for proposal in self.history.next_flights:
+            error = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
+            yield draw(
+                [proposal.gains],
+                "proposed",
+                f"Next, flight {proposal.number}",
+                "markers",
+                marker=_edged(palette, palette.prediction, size=13, symbol="diamond"),
+                hovertext=[f"Flight {proposal.number}, proposed{error} {unit if error else ''}"],
+            )
 
-    def _axes(self, palette: Palette, index: int, one: Slice) -> dict[str, object]:
+    def _axes(self, palette: theme.Palette, index: int, one: Slice) -> dict[str, object]:
         across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
         named = {gain.name: gain for gain in self.history.gains}
         suffix = theme.suffix(index)
@@ -194,7 +202,7 @@ class LandscapeFigure:
             for own, other, gain, values, place, ticks in axes
         }
 
-    def _note(self, palette: Palette, scale: Scale) -> dict[str, object]:
+    def _note(self, palette: theme.Palette, scale: Scale) -> dict[str, object]:
         """Text below the slices: where they lie, and the contour interval."""
         held = ", ".join(f"{name} {value:.4g}" for name, value in self.landscape.centre.items())
         between = "<br>" if self.stacked else " · "
@@ -228,11 +236,10 @@ class LandscapeFigure:
             for flight in history.flights
         ]
         rows += [self._row("Tried on the model", step.gains, step.predicted_error, None) for step in self.search.tried]
-        if history.proposal is not None:
-            next_one = history.proposal
-            rows.append(
-                self._row(f"Flight {next_one.number}, proposed", next_one.gains, next_one.predicted_error, None)
-            )
+        rows += [
+            self._row(f"Flight {flight.number}, proposed", flight.gains, flight.predicted_error, None)
+            for flight in history.next_flights
+        ]
         for one in self.landscape.slices:
             gains, error = lowest(one, self.landscape.centre)
             rows.append(self._row(f"Lowest of {one.y} over {one.x}", gains, error, None))
@@ -264,6 +271,11 @@ def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str,
         cliponaxis=True,
         **more,
     )
+
+
+def _edged(palette: theme.Palette, colour: str, **mark: object) -> dict[str, object]:
+    """A filled mark that stands out from the contours and the path."""
+    return theme.solid(colour, **mark, line={"width": 1.5, "color": palette.surface})
 
 
 def _hover_text(flight: FlightData, unit: str) -> str:

@@ -7,21 +7,19 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
 from app.figures import theme
 from app.figures.base import Trace, reading, scatter
 from app.figures.data import Band, Curve, FlightData, History, Range
 from app.figures.scale import thin_by_bends, thinned
-from app.figures.theme import Palette
 
 GLITCH_POINTS: Final = 60
 Side = Literal["left", "center", "right"]
 """Where a label is, seen from its mark."""
 
 
-def band_traces(palette: Palette, band: Band | None) -> Iterator[Trace]:
+def band_traces(palette: theme.Palette, band: Band | None) -> Iterator[Trace]:
     """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
     if band is None:
         return
@@ -37,7 +35,7 @@ def band_traces(palette: Palette, band: Band | None) -> Iterator[Trace]:
 
 
 def glitch_traces(
-    palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+    palette: theme.Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
 ) -> Iterator[Trace]:
     """The glitches of a flight's record, over its curve: one trace, or none."""
     if curve is None or not glitches:
@@ -67,14 +65,23 @@ PRINT: Final = 0.18
 
 
 def off_scale_traces(
-    palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
+    palette: theme.Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
 ) -> list[Trace]:
-    """Marks at height `top` of an axis that ends with flight `last`.
-
-    If there are few flights, with the errors that have room.
+    """Marks at height `top` of an axis that ends with flight `last`: of many flights in one trace, of few one each, and
+    with the errors that have room.
     """
     if crowded:
-        return [_together(palette, flights, top, unit)] if flights else []
+        together = scatter(
+            "Off scale",
+            ([flight.number for flight in flights], [top] * len(flights)),
+            role="off scale",
+            mode="markers",
+            text=[f"{flight.error:.2f} {unit}" for flight in flights],
+            marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
+            cliponaxis=False,
+            hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+        )
+        return [together] if flights else []
     printed = set(_with_room([flight.number for flight in flights], PRINT * last))
     return [_alone(palette, flight, top, unit, in_print=flight.number in printed) for flight in flights]
 
@@ -88,7 +95,7 @@ def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
             yield number
 
 
-def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
+def _alone(palette: theme.Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
     text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
     return scatter(
         text,
@@ -103,20 +110,6 @@ def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_pr
         textfont=_readable(palette.bad),
         cliponaxis=False,
         hovertemplate=f"{text}<extra></extra>",
-    )
-
-
-def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> Trace:
-    """Many flights in one trace, without printed errors."""
-    return scatter(
-        "Off scale",
-        ([flight.number for flight in flights], [top] * len(flights)),
-        role="off scale",
-        mode="markers",
-        text=[f"{flight.error:.2f} {unit}" for flight in flights],
-        marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
-        cliponaxis=False,
-        hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
     )
 
 
@@ -226,14 +219,15 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
     curves = [curve for curve in curves if len(curve.time_s)]
     if not curves:
         return None
-    instants = _instants(until_s)
-    table: NDArray[np.float64] = np.array([np.interp(instants, curve.time_s, curve.values) for curve in curves])
+    early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)
+    instants = np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
+    table = np.array([np.interp(instants, curve.time_s, curve.values) for curve in curves])
     lower, middle, upper = np.percentile(table, PERCENTILES, axis=0)
     band = Band(lower=Curve(instants, lower), upper=Curve(instants, upper))
     return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
 
 
-def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> Iterator[Trace]:
+def envelope_traces(palette: theme.Palette, envelope: Envelope | None, unit: str) -> Iterator[Trace]:
     """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
     if envelope is None:
         return
@@ -253,11 +247,6 @@ def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> I
         legendrank=800,
         hovertemplate=reading(f"Median of {envelope.flights} flights", unit),
     )
-
-
-def _instants(until_s: float) -> Samples:
-    early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)
-    return np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
 
 
 def _points(curve: Curve) -> tuple[list[float], list[float]]:

@@ -11,7 +11,6 @@ import numpy as np
 from app.core.records.overlaid import Overlaid
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 Style = Literal[
     "goal", "reference", "measured", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
@@ -67,7 +66,7 @@ class PanelsFigure:
     """
 
     plot: Plot
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "panels"
 
     @property
@@ -78,7 +77,7 @@ class PanelsFigure:
         return None if any(panel.lines for panel in self.plot.panels) else "Nothing to draw."
 
     def compute(self) -> Card:
-        palette, plot = PALETTES[self.theme], self.plot
+        palette, plot = theme.PALETTES[self.theme_name], self.plot
         axes: dict[str, object] = {}
         traces: list[Trace] = []
         named: set[str] = set()
@@ -90,7 +89,7 @@ class PanelsFigure:
         layout = theme.layout(palette, uirevision=plot.title, showlegend=len(named) > 1, **axes)
         return ready(self, traces, layout, summary=plot.summary, table=self._table())
 
-    def _trace(self, palette: Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
+    def _trace(self, palette: theme.Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
         colour, width, dash = _pen(palette, line.style)
         drawn: dict[str, object] = (
             {"mode": "markers", "marker": theme.solid(colour, size=7), "cliponaxis": False}
@@ -98,39 +97,53 @@ class PanelsFigure:
             else {"mode": "lines", "line": theme.line(colour, width, dash)}
         )
         note = f"<br>{line.note}" if line.note else ""
-        trace = scatter(
-            line.name,
-            (list(line.x), list(line.y)),
-            role=line.style,
-            about={"panel": number, "line": line.name},
-            legendgroup=line.name,
-            showlegend=in_legend,
-            hovertemplate=f"<b>{line.name}</b><br>%{{x}} · %{{y:.{panel.digits}f}}{note}<extra></extra>",
+        return (
+            scatter(
+                line.name,
+                (list(line.x), list(line.y)),
+                role=line.style,
+                about={"panel": number, "line": line.name},
+                legendgroup=line.name,
+                showlegend=in_legend,
+                hovertemplate=f"<b>{line.name}</b><br>%{{x}} · %{{y:.{panel.digits}f}}{note}<extra></extra>",
+            )
+            | theme.on(number)
+            | drawn
         )
-        return trace | theme.on(number) | drawn
 
-    def _axes(self, palette: Palette, number: int, panel: Panel) -> dict[str, object]:
+    def _axes(self, palette: theme.Palette, number: int, panel: Panel) -> dict[str, object]:
         count = len(self.plot.panels)
         x = {} if self.plot.x_range is None else {"range": list(self.plot.x_range)}
         y = {} if panel.y_range is None else {"range": list(panel.y_range)}
-        ticks = 7 if count == 1 else 4
-        place = (number, count, GAP)
-        return theme.panel_axes(palette, place, self.plot.x_title, x, panel.y_title, nticks=ticks, **y)
+        return theme.panel_axes(
+            palette,
+            (number, count, GAP),
+            self.plot.x_title,
+            x,
+            panel.y_title,
+            nticks=7 if count == 1 else 4,
+            **y,
+        )
 
     def _table(self) -> Table:
-        several = len(self.plot.panels) > 1
-        columns = [Column("x", self.plot.x_title, digits=self.plot.x_digits)]
-        lines: list[tuple[Line, int]] = []
-        for number, panel in enumerate(self.plot.panels, start=1):
-            for line in panel.lines:
-                title = f"{panel.y_title}: {line.name}" if several else line.name
-                columns.append(Column(f"panel_{number}_{len(lines) + 1}", title, digits=panel.digits))
-                lines.append((line, panel.digits))
-        rows = tuple(
-            (round(x, 6), *(_at(line, x, digits + 1) for line, digits in lines))
-            for x in self._abscissae([line for line, _ in lines])
+        panels = self.plot.panels
+        drawn = [(number, panel, line) for number, panel in enumerate(panels, start=1) for line in panel.lines]
+        columns = (
+            Column("x", self.plot.x_title, digits=self.plot.x_digits),
+            *(
+                Column(
+                    f"panel_{number}_{place}",
+                    f"{panel.y_title}: {line.name}" if len(panels) > 1 else line.name,
+                    digits=panel.digits,
+                )
+                for place, (number, panel, line) in enumerate(drawn, start=1)
+            ),
         )
-        return Table(tuple(columns), rows)
+        rows = (
+            (round(x, 6), *(_at(line, x, panel.digits + 1) for _, panel, line in drawn))
+            for x in self._abscissae([line for *_, line in drawn])
+        )
+        return Table(columns, tuple(rows))
 
     def _abscissae(self, lines: list[Line]) -> list[float]:
         every = sorted({x for line in lines for x in line.x})
@@ -149,7 +162,7 @@ def _at(line: Line, x: float, digits: int) -> Cell:
     return round(float(np.interp(x, line.x, line.y)), digits)
 
 
-def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
+def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
     """Colour, width and dash."""
     _, orange, blue = palette.gains
     pens: dict[Style, tuple[str, float, str]] = {

@@ -1,7 +1,6 @@
 """Axis ranges that are robust against outliers, and thinned data for drawing."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from statistics import median_low
 from typing import Final
 
@@ -17,17 +16,9 @@ SMOOTH_POINTS: Final = 1000
 """Number of samples among which the bends of a smooth curve are found."""
 
 
-@dataclass(frozen=True, slots=True)
-class RobustRange:
-    """`low` … `high` for an axis; `outside` are the indices of the series that exceed it at the top."""
-
-    low: float
-    high: float
-    outside: tuple[int, ...]
-
-
-def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: float = 5.0) -> RobustRange:
-    """A range that covers `low` … `high` and every peak that is not an outlier.
+def robust_top(peaks: Sequence[float], *, low: float, high: float, spread: float = 5.0) -> tuple[float, list[int]]:
+    """The upper end of an axis from `low` on that covers `high` and every peak that is not an outlier, and the indices
+    of the outliers.
 
     A peak is an outlier if it exceeds `high` by more than half of the range `low` … `high`, and the (low) median of the
     peaks by more than `spread` times their median absolute deviation.
@@ -35,10 +26,8 @@ def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: flo
     middle = median_low(peaks) if peaks else high
     deviation = median_low([abs(peak - middle) for peak in peaks]) if peaks else 0.0
     limit = max(high + 0.5 * (high - low), middle + spread * deviation)
-    outside = tuple(index for index, peak in enumerate(peaks) if peak > limit)
     top = max([high, *(peak for peak in peaks if peak <= limit)])
-    pad = MARGIN * (top - low)
-    return RobustRange(low=low - pad, high=top + pad, outside=outside)
+    return top + MARGIN * (top - low), [index for index, peak in enumerate(peaks) if peak > limit]
 
 
 RobustSpan = tuple[float, float, tuple[int, ...]]
@@ -48,9 +37,9 @@ def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> Robust
     """A two-sided range for whole curves: low, high, and the curves that leave it on either side."""
     if not curves:
         curves = [np.array([low, high])]
-    up = robust_range([float(values.max()) for values in curves], low=low, high=high)
-    down = robust_range([-float(values.min()) for values in curves], low=-high, high=-low)
-    return -down.high, up.high, tuple(sorted({*up.outside, *down.outside}))
+    top, above = robust_top([float(values.max()) for values in curves], low=low, high=high)
+    bottom, below = robust_top([-float(values.min()) for values in curves], low=-high, high=-low)
+    return -bottom, top, tuple(sorted({*above, *below}))
 
 
 def span_around(goal: Samples, curves: Sequence[Samples], *, headroom: float = 1.0) -> RobustSpan:

@@ -4,7 +4,6 @@ best emphasised, the next one's prediction dashed.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, ClassVar, Final, cast
 
 from app.core.formatting import count, short
@@ -31,9 +30,11 @@ from app.figures.overlays import (
     select_individual_flights,
 )
 from app.figures.scale import RobustSpan, span_around, thin_by_bends, thinned
-from app.figures.standings import SHARED_LEGEND, drawing_order, standing_of, style_of
-from app.figures.theme import PALETTES, Palette, ThemeName
 
+SHARED_LEGEND: Final = {"earlier": "Earlier", "invalid": "Not counted"}
+"""Standings whose flights look alike and share a legend entry."""
+_ORDER: Final = ("invalid", "earlier", "baseline", "latest", "unjudged", "best")
+"""The most important flights last, on top."""
 CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
@@ -69,7 +70,7 @@ class TrajectoriesFigure:
     """
 
     history: History
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "takeoffs"
 
     @property
@@ -80,17 +81,16 @@ class TrajectoriesFigure:
         return None
 
     def compute(self) -> Card:
-        palette, history = PALETTES[self.theme], self.history
+        palette, history = theme.PALETTES[self.theme_name], self.history
         emphasised = select_individual_flights(history, history.chosen)
         recorded = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
         drawn = [flight for flight in recorded if flight.number in emphasised]
-        in_order = sorted(drawn, key=partial(drawing_order, history))
+        in_order = sorted(drawn, key=lambda flight: (_ORDER.index(history.standing_of(flight)), flight.number))
         envelope = envelope_of(recorded, self._lasts_s) if len(drawn) < len(recorded) else None
         points = max(60, min(CURVE_POINTS, ALL_POINTS // max(1, len(drawn))))
-        band = None if history.proposal is None else history.proposal.band
         traces = [
             *envelope_traces(palette, envelope, history.output_unit),
-            *band_traces(palette, band),
+            *band_traces(palette, None if history.proposal is None else history.proposal.band),
             *self._goals(palette),
             *self._altitude_limit(palette),
         ]
@@ -105,8 +105,7 @@ class TrajectoriesFigure:
         leaving = []
         if is_step(history.set_point):
             # Plotly places an axis only if it has a trace with a point, even a missing one.
-            one_missing = ([None], [None])
-            traces.append(self._empty(palette, "live deviation", "Flying now, deviation", one_missing, yaxis="y2"))
+            traces.append(self._empty(palette, "live deviation", "Flying now, deviation", ([None], [None]), yaxis="y2"))
             leaving = off_scale_deviations(
                 palette,
                 drawn,
@@ -116,12 +115,14 @@ class TrajectoriesFigure:
                 window=self._visible,
             )
         traces += [*leaving_top, *leaving]
-        opening = "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s"
         layout = theme.layout(
             palette,
             **self._axes(palette, low, high),
             margin=dict(theme.SIGNED_MARGIN_PX),
-            meta={"whole_s": self._whole_s, "opening": opening},
+            meta={
+                "whole_s": self._whole_s,
+                "opening": "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s",
+            },
             uirevision="takeoffs",
         )
         summary = self._summary(len(leaving_top), len(leaving))
@@ -146,7 +147,7 @@ class TrajectoriesFigure:
     def _whole_s(self) -> list[float]:
         return [-0.01 * self._lasts_s, self._lasts_s]
 
-    def _axes(self, palette: Palette, low: float, high: float) -> dict[str, object]:
+    def _axes(self, palette: theme.Palette, low: float, high: float) -> dict[str, object]:
         """The output on top, its deviation from the set point below it, over one axis of time."""
         history, unit = self.history, self.history.output_unit
         both = is_step(history.set_point)
@@ -161,7 +162,7 @@ class TrajectoriesFigure:
             axes["yaxis2"] = deviation_axis(palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])
         return axes
 
-    def _off_scale(self, palette: Palette, flights: list[FlightData], low: float, high: float) -> list[Trace]:
+    def _off_scale(self, palette: theme.Palette, flights: list[FlightData], low: float, high: float) -> list[Trace]:
         """Marks of the flights that leave the upper panel in the visible time range."""
         parts = (
             (flight.number, part_off_scale(flight.curve, low, high, self._visible))
@@ -175,7 +176,7 @@ class TrajectoriesFigure:
             if part is not None
         ]
 
-    def _deviations(self, palette: Palette, drawn: list[FlightData]) -> Iterator[Trace]:
+    def _deviations(self, palette: theme.Palette, drawn: list[FlightData]) -> Iterator[Trace]:
         """Output − target of each flight and of the prediction, in the lower panel."""
         if not is_step(self.history.set_point):
             return
@@ -187,7 +188,7 @@ class TrajectoriesFigure:
                 name,
                 deviation_of(curve, self.history.target),
                 points,
-                line=style_of(palette, look),
+                line=theme.line_of(palette, look),
                 showlegend=False,
                 yaxis="y2",
                 hovertemplate=reading(title, self.history.output_unit, form="+.3f"),
@@ -196,7 +197,7 @@ class TrajectoriesFigure:
 
         for flight in drawn:
             if flight.curve is not None:
-                name, standing = f"Flight {flight.number}, deviation", standing_of(self.history, flight)
+                name, standing = f"Flight {flight.number}, deviation", self.history.standing_of(flight)
                 yield deviation(
                     name,
                     name,
@@ -221,21 +222,19 @@ class TrajectoriesFigure:
     @property
     def _deviation_limit(self) -> float:
         """Contains the best, the latest valid and the next flight."""
-        history = self.history
-        shown = [history.best, *history.valid[-1:], history.proposal]
+        shown = [self.history.best, *self.history.valid[-1:], self.history.proposal]
         curves = [one.curve for one in shown if one is not None and one.curve is not None]
-        return deviation_limit(curves, history.target)
+        return deviation_limit(curves, self.history.target)
 
     def _span(self, drawn: list[FlightData]) -> RobustSpan:
         """From the ground to above the set point; if the set point is zero, the range of the first flight."""
-        curves = [flight.curve.values for flight in drawn if flight.curve is not None]
-        if self.history.proposal is not None and self.history.proposal.curve is not None:
-            curves.append(self.history.proposal.curve.values)
+        shown = (*drawn, *self.history.next_flights)
+        curves = [flight.curve.values for flight in shown if flight.curve is not None]
         return span_around(self.history.set_point.values, curves, headroom=HEADROOM)
 
-    def _flight(self, palette: Palette, flight: FlightData, points: int) -> Trace:
+    def _flight(self, palette: theme.Palette, flight: FlightData, points: int) -> Trace:
         assert flight.curve is not None
-        standing = standing_of(self.history, flight)
+        standing = self.history.standing_of(flight)
         label = {
             "best": f"{flight.number} · {'best' if self.history.is_best_of_best_gains else 'lowest error'}",
             "latest": f"{flight.number} · latest",
@@ -252,23 +251,23 @@ class TrajectoriesFigure:
             role="flight",
             about={"trial": flight.number, "standing": standing},
             uid=f"flight-{flight.number}",
-            line=style_of(palette, standing),
+            line=theme.line_of(palette, standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
             showlegend=standing not in SHARED_LEGEND,
             hovertemplate=reading(f"Flight {label}", self.history.output_unit, error),
         )
 
-    def _legend(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
+    def _legend(self, palette: theme.Palette, drawn: list[FlightData]) -> list[Trace]:
         """One entry for all flights that look alike, so that the legend does not grow with every flight."""
-        standings = {standing_of(self.history, flight) for flight in drawn}
+        standings = {self.history.standing_of(flight) for flight in drawn}
         return [
             scatter(
                 name,
                 ([None], [None]),
                 role="legend",
                 about={"standing": standing},
-                line=style_of(palette, standing),
+                line=theme.line_of(palette, standing),
                 legendgroup=standing,
                 legendrank=800,
             )
@@ -276,7 +275,7 @@ class TrajectoriesFigure:
             if standing in standings
         ]
 
-    def _goals(self, palette: Palette) -> list[Trace]:
+    def _goals(self, palette: theme.Palette) -> list[Trace]:
         """Set point, and reference if it is known."""
         goals = (("Set point", self.history.set_point, "dot"), ("Reference", self.history.reference, "dashdot"))
         return [
@@ -291,7 +290,7 @@ class TrajectoriesFigure:
             if curve is not None
         ]
 
-    def _altitude_limit(self, palette: Palette) -> Iterator[Trace]:
+    def _altitude_limit(self, palette: theme.Palette) -> Iterator[Trace]:
         limit_m = self.history.altitude_limit_m
         if limit_m is None:
             return
@@ -304,7 +303,7 @@ class TrajectoriesFigure:
             visible=False,
         )
 
-    def _prediction(self, palette: Palette) -> Iterator[Trace]:
+    def _prediction(self, palette: theme.Palette) -> Iterator[Trace]:
         proposal = self.history.proposal
         if proposal is None or proposal.curve is None:
             return
@@ -315,13 +314,18 @@ class TrajectoriesFigure:
             role="prediction",
             about={"trial": proposal.number},
             uid="prediction",
-            line=style_of(palette, "prediction"),
+            line=theme.line_of(palette, "prediction"),
             legendrank=899,
             hovertemplate=reading(f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit),
         )
 
     def _empty(
-        self, palette: Palette, role: str, name: str, points: tuple[list[None], list[None]] = ([], []), **style: Any
+        self,
+        palette: theme.Palette,
+        role: str,
+        name: str,
+        points: tuple[list[None], list[None]] = ([], []),
+        **style: Any,
     ) -> Trace:
         """An empty curve that the page fills."""
         return scatter(
@@ -339,12 +343,8 @@ class TrajectoriesFigure:
     def _trace(
         self, name: str, curve: Curve, points: int, *, role: str, about: Mapping[str, object], **style: Any
     ) -> Trace:
-        window = self.history.window
-        drawn = (
-            thinned(curve.time_s, curve.values, points // 2, Range(*self._opening_s))
-            if window is None
-            else thinned(curve.time_s, curve.values, points, window)
-        )
+        each = points // 2 if self.history.window is None else points
+        drawn = thinned(curve.time_s, curve.values, each, self._visible)
         return scatter(name, drawn, role=role, about=about, **style)
 
     def _summary(self, outside: int, leaving: int) -> str:

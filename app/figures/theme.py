@@ -131,6 +131,19 @@ def line(colour: str, width: float, dash: str = "solid") -> dict[str, object]:
     return {"color": colour, "width": width, "dash": dash, "simplify": False}
 
 
+def line_of(palette: Palette, standing: str) -> dict[str, object]:
+    """The line of a flight with this standing (see `History.standing_of`), or of the `prediction`."""
+    return {
+        "best": line(palette.best, 3),
+        "latest": line(palette.ink, 2),
+        "baseline": line(palette.earlier, 1.75, "longdash"),
+        "prediction": line(palette.prediction, 2.25, "dash"),
+        "earlier": line(palette.earlier, 1.25),
+        "invalid": line(palette.bad, 1.25, "dot"),
+        "unjudged": line(palette.ink, 2, "longdash"),
+    }[standing]
+
+
 def suffix(index: int) -> str:
     """What follows `x`, `y`, `xaxis` or `yaxis` in the name of the axis at an index from 1."""
     return "" if index == 1 else str(index)
@@ -192,5 +205,13 @@ def note(palette: Palette, text: str, **more: object) -> dict[str, object]:
 
 def upright(at: float, colour: str, width: float, **axes: object) -> dict[str, object]:
     """A dotted vertical line behind the curves, from the bottom to the top of these axes."""
-    line = {"color": colour, "width": width, "dash": "dot"}
-    return {"type": "line", "x0": at, "x1": at, "y0": 0, "y1": 1, "layer": "below", "line": line, **axes}
+    return {
+        "type": "line",
+        "x0": at,
+        "x1": at,
+        "y0": 0,
+        "y1": 1,
+        "layer": "below",
+        "line": {"color": colour, "width": width, "dash": "dot"},
+        **axes,
+    }

@@ -10,7 +10,6 @@ from app.core.formatting import count
 from app.core.statistics.drift import MONITORED_PARAMETERS, Fitted
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, literal, ready, scatter
-from app.figures.theme import PALETTES, Palette, ThemeName
 
 REACH: Final = 1.96
 """Half width of a 95 % interval, in standard errors."""
@@ -37,7 +36,7 @@ class CalibrationFigure:
     points: tuple[Point, ...]
     since: int | None
     verdict: str
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "calibration"
     title: ClassVar[str] = "Calibration history"
 
@@ -47,7 +46,7 @@ class CalibrationFigure:
         return "The model's fitted parameters appear here once a campaign with the calibrated model has flown."
 
     def compute(self) -> Card:
-        palette = PALETTES[self.theme]
+        palette = theme.PALETTES[self.theme_name]
         names = [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
         first = {name: next(point.fitted[name] for point in self.points if name in point.fitted) for name in names}
         ticks = theme.flight_ticks(max(point.flight for point in self.points))
@@ -75,7 +74,7 @@ class CalibrationFigure:
             table=self._table(first),
         )
 
-    def _panel(self, palette: Palette, index: int, name: str) -> Trace:
+    def _panel(self, palette: theme.Palette, index: int, name: str) -> Trace:
         shown = [point for point in self.points if name in point.fitted]
         first = shown[0].fitted[name]
         return scatter(
@@ -98,21 +97,22 @@ class CalibrationFigure:
             f"{first.unit}<extra></extra>",
         )
 
-    def _tuned(self, palette: Palette, panels: int) -> list[dict[str, object]]:
+    def _tuned(self, palette: theme.Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
-        suffixes = map(theme.suffix, range(1, panels + 1))
         return [
             theme.upright(self.since, palette.prediction, 1.5, xref=f"x{suffix}", yref=f"y{suffix} domain")
-            for suffix in suffixes
+            for suffix in map(theme.suffix, range(1, panels + 1))
         ]
 
     def _table(self, first: Mapping[str, Fitted]) -> Table:
-        columns = [Column("flight", "Flight of the vehicle", digits=0), Column("campaign", "Campaign", digits=0)]
-        columns.append(Column("trial", "Its flight", digits=0))
+        columns = [
+            Column("flight", "Flight of the vehicle", digits=0),
+            Column("campaign", "Campaign", digits=0),
+            Column("trial", "Its flight", digits=0),
+        ]
         for name, one in first.items():
-            columns.append(Column(name, one.title, one.unit))
-            columns.append(Column(f"{name}_se", "Standard error", one.unit))
+            columns += [Column(name, one.title, one.unit), Column(f"{name}_se", "Standard error", one.unit)]
         rows: list[tuple[Cell, ...]] = []
         for point in self.points:
             cells: list[Cell] = [point.flight, point.campaign_id, point.trial_number]
@@ -143,7 +143,7 @@ class BatteriesFigure:
     """Table columns: `flight`, `battery`, `before`, `after`. A line connects each voltage before with the one after."""
 
     flights: tuple[BatteryFlight, ...]
-    theme: ThemeName = "light"
+    theme_name: theme.ThemeName = "light"
     name: ClassVar[str] = "batteries"
     title: ClassVar[str] = "Batteries"
 
@@ -153,7 +153,7 @@ class BatteriesFigure:
         return "Voltages before and after each flight appear here once a flight has reported them."
 
     def compute(self) -> Card:
-        palette = PALETTES[self.theme]
+        palette = theme.PALETTES[self.theme_name]
         labels = list(dict.fromkeys(flight.battery for flight in self.flights))
         layout = theme.layout(
             palette,
@@ -180,7 +180,7 @@ class BatteriesFigure:
             table=Table(columns, rows),
         )
 
-    def _battery(self, palette: Palette, place: int, label: str) -> Trace:
+    def _battery(self, palette: theme.Palette, place: int, label: str) -> Trace:
         colour = palette.gains[place % len(palette.gains)]
         own = [flight for flight in self.flights if flight.battery == label]
         symbols = (("circle-open", "circle"), ("square-open", "square"), ("diamond-open", "diamond"))

@@ -21,8 +21,7 @@ from starlette.datastructures import FormData, UploadFile
 from app.accounts.permissions import RequestContext
 from app.common.errors import InputError, MediaTypeError, Problem
 from app.common.settings import Settings
-from app.db.idempotency import carry_out_once
-from app.db.session import Database
+from app.db.session import Database, carry_out_once
 from app.figures.theme import ThemeName
 from app.live.hub import Live as LiveLink
 from app.web.origin import caller_of

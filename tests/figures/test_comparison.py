@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from app.figures.base import card_of
-from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure, line_style
+from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure, pen
 from app.figures.data import Curve
 from app.figures.theme import PALETTES
 from tests.figures.builders import SET_POINT, TIME_S, climb, layout, trace, traces
@@ -32,7 +32,7 @@ def compared(*curves: Curve | None, first: str = "flight 0") -> ComparisonData:
 
 def test_twenty_flights_are_told_apart_by_colour_and_dash_together() -> None:
     for palette in PALETTES.values():
-        pens = [line_style(palette, index) for index in range(20)]
+        pens = [(pen(palette, index)["color"], pen(palette, index)["dash"]) for index in range(20)]
         assert len(set(pens)) == 20
         assert all(one[0] != other[0] and one[1] != other[1] for one, other in itertools.pairwise(pens)), (
             "neighbours differ in both"

@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 
 from app.core.tuning.landscape import Landscape, Slice
-from app.figures.contours import Label, Scale, place_labels, scale_of
 from app.figures.landscape import LandscapeFigure, Search, Tried, lowest
-from app.figures.landscape_layout import Box, mark_box, number_box, number_position
+from app.figures.slices import Box, Scale, mark_box, number_box, number_position, place_labels, scale_of
 from tests.figures.builders import flight, history, proposal, trace
 
 VALUES = tuple(float(value) for value in range(10))
@@ -79,8 +78,8 @@ def test_a_number_below_its_mark_and_one_above_the_next_mark_do_not_overlap() ->
     assert trace(card, "path")["text"] == ["1", "2", "", "4"]
 
 
-def error_at(label: Label) -> float:
-    x, y = (9.0 * share for share in label.position)
+def error_at(label: Box) -> float:
+    x, y = (9.0 * share for share in label.centre)
     return 0.1 + 0.01 * ((x - 4) ** 2 + (y - 6) ** 2)
 
 
@@ -88,21 +87,21 @@ def test_each_contour_is_labelled_on_itself_where_no_flight_number_or_mark_is() 
     one, scale = Slice(x="kp", y="ki", x_values=VALUES, y_values=VALUES, errors=BOWL), Scale(0.1, 0.4, 0.05)
     flown = [{"kp": float(kp), "ki": float(ki), "kd": 80.0} for kp, ki in ((6, 6), (4, 8), (2, 6), (4, 4), (7, 7))]
     taken = [mark_box(one, gains) for gains in flown] + [number_box(one, gains, "1, 2") for gains in flown]
-    labels = list(place_labels(one, scale, taken))
-    assert [label.text for label in labels] == ["0.15", "0.2", "0.25", "0.3", "0.35", "0.4"]
-    for label in labels:
-        assert error_at(label) == pytest.approx(float(label.text), abs=0.0025)  # linear between points of a parabola
-        others = [other.box for other in labels if other is not label]
-        assert label.box.clearance([*taken, *others]) > 0.0
+    labels = place_labels(one, scale, taken)
+    assert list(labels) == ["0.15", "0.2", "0.25", "0.3", "0.35", "0.4"]
+    for text, label in labels.items():
+        assert error_at(label) == pytest.approx(float(text), abs=0.0025)  # linear between points of a parabola
+        others = [other for other in labels.values() if other is not label]
+        assert label.clearance([*taken, *others]) > 0.0
 
 
 def test_a_contour_without_a_free_point_has_no_label() -> None:
     one, scale = Slice(x="kp", y="ki", x_values=VALUES, y_values=VALUES, errors=BOWL), Scale(0.1, 0.4, 0.05)
     left_half = Box((0.25, 0.5), (0.5, 1.0))
-    labels = list(place_labels(one, scale, [left_half]))
-    assert labels != []
-    assert all(label.position[0] > 0.5 for label in labels)
-    assert list(place_labels(one, scale, [Box((0.5, 0.5), (1.0, 1.0))])) == []
+    labels = place_labels(one, scale, [left_half])
+    assert labels != {}
+    assert all(label.centre[0] > 0.5 for label in labels.values())
+    assert place_labels(one, scale, [Box((0.5, 0.5), (1.0, 1.0))]) == {}
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,8 @@ from datetime import timedelta
 import pytest
 from fastapi.testclient import TestClient
 
-from app.db.idempotency import KEPT
 from app.db.models import CampaignRow, IdempotencyRow, TrialRow
-from app.db.session import Database
+from app.db.session import KEPT_ANSWERS, Database
 from app.db.types import utc_now
 from tests.builders import (
     create_campaign,
@@ -80,7 +79,7 @@ def test_a_key_that_is_none_is_refused(client: TestClient, key: str) -> None:
 def test_old_keys_are_forgotten(client: TestClient, database: Database) -> None:
     client.post("/api/campaigns", json={"name": "a"}, headers={"Idempotency-Key": "old"})
     with database.write() as session:
-        session.get_one(IdempotencyRow, "old").created_at = utc_now() - KEPT - timedelta(seconds=1)
+        session.get_one(IdempotencyRow, "old").created_at = utc_now() - KEPT_ANSWERS - timedelta(seconds=1)
     client.post("/api/campaigns", json={"name": "b"}, headers={"Idempotency-Key": "new"})
     with database.read() as session:
         assert [row.key for row in session.query(IdempotencyRow)] == ["new"]
