@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.autopilots.ardupilot import loop as ardupilot_loop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.log import MODES
 from app.autopilots.ardupilot.replica import parameters as ardupilot_parameters
-from app.autopilots.px4 import loop as px4_loop
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.replica import parameters as px4_parameters
 
 
@@ -57,7 +57,7 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
             mode=4,
             modes=MODES,
             messages=("LOCAL_POSITION_NED", "NAV_CONTROLLER_OUTPUT", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
-            bounds=ardupilot_loop.SPACE.bounds,
+            bounds=ArduPilotLoop.space.bounds,
             learned="MOT_THST_HOVER",
             kept=ardupilot_parameters.LOOP_NAMES,
             usual=(
@@ -78,7 +78,7 @@ AUTOPILOTS: Final[Mapping[str, CopterAutopilot]] = MappingProxyType(
             mode=6,
             modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
             messages=("LOCAL_POSITION_NED", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
-            bounds=px4_loop.SPACE.bounds,
+            bounds=Px4Loop.space.bounds,
             learned="",
             kept=px4_parameters.LOOP_NAMES,
             usual=(*px4_parameters.DEFAULTS, *px4_parameters.ESTIMATOR_NAMES),

@@ -6,17 +6,16 @@ flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter'
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
 from app.autopilots.ardupilot.experiments import ardupilot_loop, read_ardupilot
 from app.autopilots.ardupilot.replica.parameters import NEWER_NAMES, in_newer_names, in_older_names
 from app.autopilots.copter_autopilots import AUTOPILOTS, IN_TAKEOFFS, CopterAutopilot
-from app.autopilots.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
 from app.autopilots.px4.experiments import px4_loop, read_px4
-from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts
+from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording, Rows, held
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, Part, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
@@ -31,6 +30,11 @@ _SETTLED_S: Final = 6.5
 """Hover after the last step that is analysed."""
 _INTERRUPTED_S: Final = 1.0
 """Longer intervals between two messages do not count for their rate."""
+_HEARTBEAT_HOLDS_S: Final = 5.0
+_OFF_GROUND_M: Final = 0.5
+_JUMP_M: Final = 0.2
+_SAME_TARGET_M: Final = 0.01
+_AT_REST_M: Final = 0.05
 
 
 def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
@@ -44,6 +48,71 @@ def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
     return None if autopilot is None else _Reader(name, recording, autopilot).read()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rows:
+    """Signals up, in m and s, shape (n,) each; NaN where they are not known. `time_s` increases. `lean` is the cosine
+    of the demanded lean."""
+
+    time_s: Samples
+    altitude_m: Samples
+    climb_rate_m_s: Samples
+    throttle: Samples
+    lean: Samples
+    target_m: Samples
+    reference_m: Samples
+    is_disarmed: Rows
+
+    @classmethod
+    def of(cls, recording: Recording, autopilot: CopterAutopilot) -> Self:
+        """Those of a vehicle's reports, which has all that its autopilot needs."""
+        columns = recording.columns
+        time_s, altitude_m = columns["altitude_m"].time_s, columns["altitude_m"].values
+        throttle, lean = (columns[each].beside(time_s) for each in ("demanded_throttle", "lean"))
+        target_m = recording.at("target_altitude_m", time_s)
+        return cls(
+            time_s=time_s,
+            altitude_m=altitude_m,
+            climb_rate_m_s=columns["climb_rate_m_s"].values,
+            throttle=throttle if autopilot.shapes_reference else throttle * lean,
+            lean=lean,
+            target_m=target_m,
+            reference_m=altitude_m + columns["reference_error_m"].beside(time_s)
+            if autopilot.shapes_reference
+            else target_m,
+            is_disarmed=recording.at("is_armed", time_s) == 0.0,
+        )
+
+    @property
+    def is_known(self) -> Rows:
+        """Rows with all signals."""
+        signals = (self.altitude_m, self.climb_rate_m_s, self.throttle, self.lean, self.target_m, self.reference_m)
+        return np.asarray(np.isfinite(np.sum(signals, axis=0)))
+
+    @property
+    def is_off_ground(self) -> Rows:
+        """Rows above the place where it last was disarmed; all, before it was."""
+        rested = np.maximum.accumulate(np.where(self.is_disarmed, np.arange(len(self.time_s)), -1))
+        above_m = self.altitude_m - self.altitude_m[rested]
+        return np.asarray((rested < 0) | (above_m > _OFF_GROUND_M))
+
+    @property
+    def target_rate_m_s(self) -> Samples:
+        """How fast the set point moves, shape (n,): in steps."""
+        return np.diff(self.target_m, prepend=self.target_m[0]) / np.diff(self.time_s, prepend=self.time_s[0] - 1.0)
+
+    def trajectory(self, part: Part) -> Trajectory:
+        """Rows of a part that are all known, with time from its first."""
+        rows = slice(*part)
+        channels = {
+            "altitude_m": self.altitude_m[rows],
+            "climb_rate_m_s": self.climb_rate_m_s[rows],
+            "throttle": self.throttle[rows],
+            "reference_m": self.reference_m[rows],
+            "set_point_m": self.target_m[rows],
+        }
+        return Trajectory(self.time_s[rows] - self.time_s[part[0]], channels, "tlog", "vehicle")
+
+
 @dataclass(frozen=True, slots=True)
 class _Reader:
     name: str
@@ -55,7 +124,7 @@ class _Reader:
             raise self._refused(Problem("file", f"is the log of {frame}, not of a copter with several rotors"))
         if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
             raise self._refused(*problems)
-        rows = CopterRows.of(self.recording, self.autopilot)
+        rows = _Rows.of(self.recording, self.autopilot)
         none_found = (
             f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
             "in one of the messages, a jump in altitude or a parameter change"
@@ -63,7 +132,7 @@ class _Reader:
         given, parts = choose_parts(
             rows.time_s,
             self._conditions(rows),
-            rows.is_reset,
+            jumps(rows.time_s, rows.altitude_m, rows.climb_rate_m_s, _JUMP_M),
             ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
             rows.target_rate_m_s,
             self._refused_for,
@@ -88,7 +157,7 @@ class _Reader:
         """The steps from the first one before which the vehicle was at rest, to some time after the last; a step right
         before the end is left out."""
         time_s, target_m = trajectory.time_s, trajectory["set_point_m"]
-        found = steps_in(trajectory)
+        found = _steps_in(trajectory)
         rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
         field = "POSITION_TARGET_LOCAL_NED"
         if not rows:
@@ -110,11 +179,11 @@ class _Reader:
             end_s=min(float(times_s[-1]) + _SETTLED_S, float(end_s)),
         )
 
-    def _conditions(self, rows: CopterRows) -> Sequence[Condition]:
+    def _conditions(self, rows: _Rows) -> Sequence[Condition]:
         return (
-            (rows.is_following, "HEARTBEAT", f"has no flight in {self._mode}"),
+            (_follows(self.recording, self.autopilot, rows.time_s), "HEARTBEAT", f"has no flight in {self._mode}"),
             (rows.is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
-            (rows.is_off_ground, "LOCAL_POSITION_NED", f"never is {OFF_GROUND_M:g} m above the ground"),
+            (rows.is_off_ground, "LOCAL_POSITION_NED", f"never is {_OFF_GROUND_M:g} m above the ground"),
             (rows.lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
         )
 
@@ -130,7 +199,7 @@ class _Reader:
                 yield Problem(message, f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed")
 
     def _rate_hz(self, at_s: Samples) -> float:
-        following = follows(self.recording, self.autopilot, at_s)
+        following = _follows(self.recording, self.autopilot, at_s)
         intervals_s = np.diff(at_s[following] if following.any() else at_s)
         counted = intervals_s[intervals_s <= _INTERRUPTED_S]
         return 1.0 / float(counted.mean()) if counted.size else 0.0
@@ -188,3 +257,27 @@ class _Reader:
 
     def _refused(self, *problems: Problem) -> TrajectoryError:
         return TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
+
+
+def _follows(recording: Recording, autopilot: CopterAutopilot, time_s: Samples) -> Rows:
+    """Times, shape (n,), between two heartbeats with armed motors in the mode with set points, or after the last."""
+    armed, modes = recording.columns["is_armed"], recording.columns["mode"]
+    at_s, is_mode = armed.time_s, [autopilot.number_of_mode(int(mode)) == autopilot.mode for mode in modes.values]
+    following = ((armed.values > 0.0) & is_mode).astype(np.float64)
+    before = held(at_s, following, time_s, longest_s=_HEARTBEAT_HOLDS_S)
+    after = held(-at_s[::-1], following[::-1], -time_s)
+    return np.asarray((before == 1.0) & (np.isnan(after) | (after == 1.0)))
+
+
+def _steps_in(trajectory: Trajectory) -> list[int]:
+    """Rows at which the set point of a part changes, from the first change before which the vehicle was at rest."""
+    time_s, target_m = trajectory.time_s, trajectory["set_point_m"]
+    changes = (np.flatnonzero(np.abs(np.diff(target_m)) > _SAME_TARGET_M) + 1).tolist()
+
+    def is_at_rest_before(row: int) -> bool:
+        lead = slice(int(np.searchsorted(time_s, time_s[row] - LEAD_S)), row)
+        away_m = np.abs(trajectory["reference_m"][lead] - target_m[row - 1])
+        return bool(time_s[row] >= LEAD_S and away_m.max() <= _AT_REST_M and np.ptp(target_m[lead]) <= _SAME_TARGET_M)
+
+    first = next((place for place, row in enumerate(changes) if is_at_rest_before(row)), len(changes))
+    return changes[first:]

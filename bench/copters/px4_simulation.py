@@ -11,7 +11,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.px4.loop import SLOW_HZ, Px4Loop
+from app.autopilots.px4.experiments import SLOW_HZ, Px4Loop
 from app.autopilots.px4.replica import vertical as loop
 from app.autopilots.px4.replica.parameters import STEP_S, Parameters, low_pass_gain
 from app.core.analysis.flight import LoggedFlight

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.replica.parameters import Parameters
-from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.replica import parameters as px4_parameters
 from bench.copters.px4_simulation import fly_changes, sample_px4
 from bench.copters.px4_simulation import loop_of as px4_loop_of

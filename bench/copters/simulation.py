@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from scipy.signal import lfilter
 
-from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.replica import vertical as loop
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.core.analysis.flight import LoggedFlight

@@ -174,7 +174,7 @@ class Rig(Lockstep):
     def held(self) -> dict[str, float]:
         """Return the gains that the vehicle truly holds."""
         names = GAINS[self.case.autopilot]
-        return {gain: self.drone.autopilot.held(parameter) for gain, parameter in names.items()}
+        return {gain: self.drone.autopilot.parameters[parameter] for gain, parameter in names.items()}
 
     def holds(self, gains: Mapping[str, float]) -> bool:
         return self.held() == {gain: _single(value) for gain, value in gains.items()}

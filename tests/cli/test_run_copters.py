@@ -174,7 +174,7 @@ def test_three_sets_are_flown_by_hand_and_the_safe_gains_are_back(
     rig.take_the_place_of_every_vehicle(monkeypatch)
     result = CliRunner().invoke(app, ["run", f"{profile}-takeoff", "--json", str(out)])
     assert result.exit_code == 0, result.output
-    held = {name: rig.drone.autopilot.held(name) for name in HELD[autopilot]}
+    held = {name: rig.drone.autopilot.parameters[name] for name in HELD[autopilot]}
     assert held == pytest.approx(HELD[autopilot])
     see_sets_flown(profile, 3, out, result.stdout)
 

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import InputError, TrajectoryError

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.copter_tlog import copter_steps
-from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.tlog import read_tlog
 from app.core.analysis.flight import LoggedFlight
 from app.core.errors import InputError

@@ -8,14 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.px4 import simulated_hover as px4_hover
-from app.autopilots.px4.simulated_control import LOOP_S
-from app.autopilots.px4.simulated_hover import HoverSettings
+from app.autopilots.px4.simulated_control import LOOP_S, estimate_hover, estimator_settings, started_estimate
 from app.autopilots.px4.simulated_trajectory import Limits, Trajectory
 from app.core.records.trajectory import Samples
 
 FLIGHT = Path(__file__).parents[1] / "data" / "px4_loop" / "default_steps_push.csv.gz"
-SETTINGS = HoverSettings(hover_thrust=0.5, initial_error=0.1, noise_1_s=0.0036, gate=3.0, range=0.2, fast_m_s=2.0)
+SETTINGS = {
+    "MPC_THR_HOVER": 0.5,
+    "HTE_HT_ERR_INIT": 0.1,
+    "HTE_HT_NOISE": 0.0036,
+    "HTE_ACC_GATE": 3.0,
+    "HTE_THR_RANGE": 0.2,
+    "HTE_VZ_THR": 2.0,
+}
 """The flight's."""
 TAKEOFF = Limits(1.5, 0.5, 4.0)
 RAMP_UP, FLYING = 4.0, 5.0
@@ -36,9 +41,9 @@ def test_the_estimated_hover_thrust_is_that_of_the_binary(flight: dict[str, Samp
     begins = np.flatnonzero((flight["takeoff_state"] == FLYING) & (flight["z_m"] < -1.24))[0]
     a, v, dt = -flight["az_m_s2"], -flight["vz_m_s"], flight["dt_s"]
     thrust = np.roll(flight["out_thrust"], 1)
-    state, packed = SETTINGS.start(), SETTINGS.packed()
+    state, packed = started_estimate(SETTINGS), estimator_settings(SETTINGS)
     found = np.array(
-        [px4_hover.update(state, packed, a[row], thrust[row], v[row], dt[row]) for row in range(begins, len(a))]
+        [estimate_hover(state, packed, a[row], thrust[row], v[row], dt[row]) for row in range(begins, len(a))]
     )
     told = flight["hover_estimate"][begins:]
     both = ~np.isnan(found) & ~np.isnan(told)

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.log import LOOP, history
-from app.autopilots.ardupilot.loop import SPACE, ArduPilotLoop
 from app.autopilots.ardupilot.replica.parameters import (
     ACCELEROMETER_FILTER,
     ACCELEROMETER_FILTER_HZ,
@@ -87,14 +87,14 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         rows.a_d_m_s2,
         refused,
         ("PSCD", none_found),
-        SPACE.bounds,
+        ArduPilotLoop.space.bounds,
         _is_missing,
     )
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
     rate_hz = given.get(LOOP_RATE, LOOP_RATE_HZ)
     if not LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1]:
         raise refused(LOOP_RATE, f"must be {LOOP_RATES_HZ[0]:g} to {LOOP_RATES_HZ[1]:g} Hz, got {rate_hz:g}")
-    newer = in_newer_names(dict.fromkeys(SPACE.bounds, 0.0)).keys()
+    newer = in_newer_names(dict.fromkeys(ArduPilotLoop.space.bounds, 0.0)).keys()
     return LoggedFlight(
         loop=ArduPilotLoop(
             parameters=parameters_from({**given, _LEARNED: hover}),

@@ -1,10 +1,10 @@
-"""ArduCopter's entry in the registry: its on-board log, and traces with a row per step."""
+"""ArduCopter's entry in the registry: its on-board log, and traces: described CSV, one row per step (`trace_table`)."""
 
 from collections.abc import Iterable, Mapping
 from functools import partial
 from itertools import groupby
 from types import MappingProxyType
-from typing import Final
+from typing import BinaryIO, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ from app.autopilots.ardupilot.replica.parameters import (
     parameters_from,
 )
 from app.autopilots.ardupilot.replica.replay import LoopLog, LoopTrace, replayed, replica_of
-from app.autopilots.ardupilot.replica.vertical import OUTPUTS
-from app.autopilots.ardupilot.trace import COLUMNS, read_ardupilot_trace
+from app.autopilots.ardupilot.replica.vertical import INPUTS, OUTPUTS
 from app.autopilots.loop_check import (
     LoopCheck,
     Result,
@@ -35,7 +34,7 @@ from app.autopilots.recording import Column, Recording, refusal
 from app.core.errors import InputError
 from app.core.records.trajectory import Samples
 from app.logs.formats import Format
-from app.logs.trace_table import has_columns
+from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 
 _PRECISION: Final = "firmware and recording have single precision"
 
@@ -64,6 +63,13 @@ _WAYPOINT_NAVIGATION: Final = 1 << 6
 _HINT: Final = "Give ArduCopter's .bin log of a flight in GUIDED, recorded with NTUN, CTUN and PID in LOG_BITMASK."
 _SAME_LOOP_S: Final = 0.0012
 
+COLUMNS: Final = ("t_s", *INPUTS, *OUTPUTS)
+_TRACE_HINT: Final = (
+    "A trace of ArduCopter's loop has # and a JSON object with params, dt_s, start and init, a header, and one row per "
+    f"step with the columns {','.join(COLUMNS)}."
+)
+_IN_SI: Final = {"WPNAV_SPEED_UP_m_s", "WPNAV_SPEED_DN_m_s", "WPNAV_ACCEL_Z_m_s2"}
+
 
 def _examine_log(upload: Upload) -> Result:
     log = ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name)
@@ -72,19 +78,56 @@ def _examine_log(upload: Upload) -> Result:
 
 
 def _examine_trace(upload: Upload) -> Result:
-    return result_of_trace(_SIGNALS, _replayed(read_ardupilot_trace(upload.stream, name=upload.name)))
-
-
-def _replayed(trace: LoopTrace) -> TraceReplay:
+    trace = read_ardupilot_trace(upload.stream, name=upload.name)
     followed = int(trace.followed.sum())
     limited = f"{grouped(followed)} rows at a throttle limit are each computed from the recorded row before."
-    return TraceReplay(
+    replay = TraceReplay(
         time_s=trace.time_s,
         recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
         replica=dict(zip(OUTPUTS, replayed(trace).T, strict=True)),
         gains=trace.parameters.gains,
         notes=(limited, _UP) if followed else (_UP,),
     )
+    return result_of_trace(_SIGNALS, replay)
+
+
+def read_ardupilot_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
+    """Read a run, plain or gzipped. Raises InputError naming the line and the column or key of the first error."""
+    table = read_trace_table(stream, name=name, columns=COLUMNS)
+    checks, described = TraceChecks(name, _TRACE_HINT), table.description
+    checks.require_flags(table, ("limit_lower", "limit_upper"))
+    return LoopTrace(
+        parameters=parameters_from(_values(checks, described)),
+        dt_s=checks.positive_in(described, "dt_s"),
+        hover=_start(checks, described),
+        time_s=table["t_s"],
+        inputs=_columns(table, INPUTS),
+        outputs=_columns(table, OUTPUTS),
+    )
+
+
+def _columns(table: TraceTable, names: tuple[str, ...]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    return np.ascontiguousarray(np.column_stack([table[each] for each in names]))
+
+
+def _values(checks: TraceChecks, described: Mapping[str, object]) -> dict[str, float]:
+    """The firmware's parameters by name, in its units; those of WPNAV may be recorded in m instead of cm."""
+    values = checks.numbers_in(described, "params")
+    for each in _IN_SI & values.keys():
+        values[each.partition("_m_")[0]] = values.pop(each) * 100.0
+    slew = {each: described[each] for each in ("TKOFF_SLEW_TIME", "TKOFF_THR_MAX") if described.get(each) is not None}
+    return values | {each: checks.number_in(slew, each) for each in slew}
+
+
+def _start(checks: TraceChecks, described: Mapping[str, object]) -> tuple[float, float, float, float] | None:
+    start = str(described.get("start"))
+    if start.startswith("ramp"):
+        return None
+    if start != "hover":
+        raise checks.malformed("line 1, start", f"must be hover or ramp, got {start[:40]!r}")
+    first = checks.object_in(described, "init")
+    z_m, v_m_s, a_m_s2, throttle = (checks.number_in(first, each) for each in ("z_m", "v_m_s", "a_m_s2", "throttle"))
+    return throttle, z_m, v_m_s, a_m_s2
 
 
 def _notes(rows: Mapping[str, int]) -> Iterable[str]:

@@ -46,15 +46,6 @@ def _heartbeat(message: Message) -> Measurement | None:
     return mavlink.heartbeat(message, f"{number(message, 'custom_mode'):.0f}")
 
 
-_READERS: Final[mavlink.Readers] = {
-    **mavlink.READERS,
-    "HEARTBEAT": _heartbeat,
-    "NAV_CONTROLLER_OUTPUT": mavlink.altitude_error,
-    "POSITION_TARGET_LOCAL_NED": mavlink.target_altitude,
-    "ATTITUDE_TARGET": mavlink.commanded_throttle,
-}
-
-
 def _simulated() -> tuple[SimulatedKind, ...]:
     from app.autopilots.ardupilot.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
 
@@ -103,7 +94,13 @@ ARDUPILOT: Final = Autopilot(
         Requirement("GUID_OPTIONS", "without bit 6 (targets flown by the position controller)", clear_bits=1 << 6),
     ),
     set_point_settings=(Setting("MOT_HOVER_LEARN", 0.0),),
-    readers=_READERS,
+    readers={
+        **mavlink.READERS,
+        "HEARTBEAT": _heartbeat,
+        "NAV_CONTROLLER_OUTPUT": mavlink.altitude_error,
+        "POSITION_TARGET_LOCAL_NED": mavlink.target_altitude,
+        "ATTITUDE_TARGET": mavlink.commanded_throttle,
+    },
     telemetry=commands.COPTER_TELEMETRY,
     set_point_telemetry=(commands.ALTITUDE_ERROR, commands.FOLLOWED_TARGET, commands.DEMANDED_THROTTLE),
     steps=_steps,

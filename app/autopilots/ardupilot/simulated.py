@@ -1,6 +1,6 @@
 """Simulated ArduCopter, up to 4.6 and from 4.7 on, in which the vertical gains have other names.
 
-Its altitude is controlled by the replica of ArduCopter's vertical loop; see ardupilot_control.py. GUIDED has the
+Its altitude is controlled by the replica of ArduCopter's vertical loop; see simulated_control.py. GUIDED has the
 takeoff and targets of position; the S-curves of GUID_OPTIONS bit 6 and targets of speed or acceleration are missing.
 """
 
@@ -17,7 +17,6 @@ from app.autopilots.simulated.body import ACCEPTED, FAILED, Body, OutgoingMessag
 from app.autopilots.simulated.copter import Copter, copter_kind
 from app.autopilots.simulated.copter_control import SetPoint
 from app.autopilots.simulated.copter_parameters import (
-    BY_VALUE,
     Behaviour,
     FirmwareProfile,
     FlightMode,
@@ -34,7 +33,6 @@ _REPORT_ONLY: Final = 0
 _ALTITUDE_FENCE: Final = 1
 _SLOWEST_LANDING_CM_S: Final = 10.0
 
-_HOVER: Final = "MOT_THST_HOVER"
 _POSITION_ONLY: Final = 0b000111111000
 _POSITION_BITS: Final = 0b000111111111
 """The bits of POSITION_TARGET_TYPEMASK for position, velocity and acceleration."""
@@ -60,10 +58,9 @@ _COMMON: Final = (
 )
 
 
-def _loop() -> tuple[Parameter, ...]:
-    """Parameters of the vertical loop, by their names until 4.6, with the firmware's defaults."""
-    known = loop.Parameters(hover_throttle=_HOVER_THROTTLE).named
-    return tuple(real(name, value) for name, value in (known | dict.fromkeys(loop.UNSUPPORTED, 0.0)).items())
+_DEFAULTS: Final = loop.Parameters(hover_throttle=_HOVER_THROTTLE).named | dict.fromkeys(loop.UNSUPPORTED, 0.0)
+_LOOP: Final = tuple(real(name, value) for name, value in _DEFAULTS.items())
+"""Parameters of the vertical loop, by their names until 4.6, with the firmware's defaults."""
 
 
 def _renamed(parameter: Parameter) -> Parameter:
@@ -76,56 +73,53 @@ _GROUND_STATION: Final = "SYSID_MYGCS"
 _GROUND_STATION_4_7: Final = "MAV_GCS_SYSID"
 
 
-def _ids(own: str, ground_station: str) -> tuple[Parameter, ...]:
-    return Parameter(own, Kind.INT16, 1), Parameter(ground_station, Kind.INT16, 255)
-
-
-_FIRMWARE: Final = FirmwareProfile(
-    dialect=ARDUPILOTMEGA,
-    autopilot=3,
-    version=0x040600FF,
-    parameters=_ids("SYSID_THISMAV", _GROUND_STATION) + _COMMON + _loop(),
-    coding=BY_VALUE,
-    periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
-    streams=(
-        "LOCAL_POSITION_NED",
-        "GLOBAL_POSITION_INT",
-        "ATTITUDE",
-        "VFR_HUD",
-        "SYS_STATUS",
-        "GPS_RAW_INT",
-        "BATTERY_STATUS",
-        "SYSTEM_TIME",
-    ),
-    modes=(
-        FlightMode("STABILIZE", 0, _MANUAL),
-        FlightMode("ALT_HOLD", 2, _MANUAL),
-        FlightMode("GUIDED", 4, _GUIDED),
-        FlightMode("LOITER", 5, _GUIDED),
-        FlightMode("RTL", 6, _GUIDED, Behaviour.LAND, may_arm=False),
-        FlightMode("LAND", 9, _GUIDED, Behaviour.LAND, may_arm=False),
-        FlightMode("BRAKE", 17, _GUIDED, may_arm=False),
-    ),
-    land="LAND",
-    home="RTL",
-    hold="BRAKE",
-    by_hand="ALT_HOLD",
-    automatic="GUIDED",
-    refused=FAILED,
-    unready="Pre",
-    no_estimate="Arm: Need Position Estimate",
-    not_armable="Arm: Mode not armable",
-    not_landed="Disarm: not landed",
-    link_lost="GCS Failsafe",
-    fence_breached="Max Alt fence breached",
-    ground_m=0.0,
-)
-
-
 class ArduPilot(Copter):
     """ArduCopter up to 4.6. Return-to-launch only lands, because the vehicle does not move horizontally."""
 
-    firmware: ClassVar[FirmwareProfile] = _FIRMWARE
+    firmware: ClassVar[FirmwareProfile] = FirmwareProfile(
+        dialect=ARDUPILOTMEGA,
+        autopilot=3,
+        version=0x040600FF,
+        parameters=(
+            Parameter("SYSID_THISMAV", Kind.INT16, 1),
+            Parameter(_GROUND_STATION, Kind.INT16, 255),
+            *_COMMON,
+            *_LOOP,
+        ),
+        periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
+        streams=(
+            "LOCAL_POSITION_NED",
+            "GLOBAL_POSITION_INT",
+            "ATTITUDE",
+            "VFR_HUD",
+            "SYS_STATUS",
+            "GPS_RAW_INT",
+            "BATTERY_STATUS",
+            "SYSTEM_TIME",
+        ),
+        modes=(
+            FlightMode("STABILIZE", 0, _MANUAL),
+            FlightMode("ALT_HOLD", 2, _MANUAL),
+            FlightMode("GUIDED", 4, _GUIDED),
+            FlightMode("LOITER", 5, _GUIDED),
+            FlightMode("RTL", 6, _GUIDED, Behaviour.LAND, may_arm=False),
+            FlightMode("LAND", 9, _GUIDED, Behaviour.LAND, may_arm=False),
+            FlightMode("BRAKE", 17, _GUIDED, may_arm=False),
+        ),
+        land="LAND",
+        home="RTL",
+        hold="BRAKE",
+        by_hand="ALT_HOLD",
+        automatic="GUIDED",
+        refused=FAILED,
+        unready="Pre",
+        no_estimate="Arm: Need Position Estimate",
+        not_armable="Arm: Mode not armable",
+        not_landed="Disarm: not landed",
+        link_lost="GCS Failsafe",
+        fence_breached="Max Alt fence breached",
+        ground_m=0.0,
+    )
     ground_station: ClassVar[str] = _GROUND_STATION
     integral_gain: ClassVar[str] = "PSC_ACCZ_I"
 
@@ -148,7 +142,7 @@ class ArduPilot(Copter):
     def tick(self) -> list[OutgoingMessage]:
         messages = super().tick()
         if self.parameters["MOT_HOVER_LEARN"] and (hover := self.controller.learned_hover()) is not None:
-            self.parameters[_HOVER] = hover
+            self.parameters["MOT_THST_HOVER"] = hover
         return messages
 
     def prearm_failure(self) -> str | None:
@@ -179,8 +173,7 @@ class ArduPilot(Copter):
 
     def link_loss(self) -> tuple[float, Reaction]:
         """Return timeout and reaction: Land for every action of FS_GCS_ENABLE except 0."""
-        action = Reaction.LAND if self.parameters["FS_GCS_ENABLE"] else Reaction.NONE
-        return self.parameters["FS_GCS_TIMEOUT"], action
+        return self.parameters["FS_GCS_TIMEOUT"], Reaction.LAND if self.parameters["FS_GCS_ENABLE"] else Reaction.NONE
 
     def fence(self) -> tuple[float, Reaction]:
         """Return limit and reaction of the altitude fence: Land for every action except the report."""
@@ -202,9 +195,14 @@ class ArduPilot47(ArduPilot):
     """ArduCopter from 4.7 on: other names, and acceleration gains of a tenth."""
 
     firmware: ClassVar[FirmwareProfile] = replace(
-        _FIRMWARE,
+        ArduPilot.firmware,
         version=0x040700FF,
-        parameters=_ids("MAV_SYSID", _GROUND_STATION_4_7) + _COMMON + tuple(map(_renamed, _loop())),
+        parameters=(
+            Parameter("MAV_SYSID", Kind.INT16, 1),
+            Parameter(_GROUND_STATION_4_7, Kind.INT16, 255),
+            *_COMMON,
+            *map(_renamed, _LOOP),
+        ),
     )
     ground_station: ClassVar[str] = _GROUND_STATION_4_7
     integral_gain: ClassVar[str] = "PSC_D_ACC_I"

@@ -116,7 +116,11 @@ class ArduPilotController(AltitudeController):
     def hold(self) -> None:
         if self._is_in_flight:
             self._enter_position_mode()
-            self._target_m = self._body.altitude_m + self._stopping_distance_m(self._body.climb_rate_m_s)
+            acceleration, jerk = self._packed[loop.ACCELERATION], self._packed[loop.JERK]
+            stops_within_m = inverse_square_root(
+                self._body.climb_rate_m_s, 0.5 * jerk / acceleration, 0.5 * acceleration
+            )
+            self._target_m = self._body.altitude_m + stops_within_m
             self.phase = Phase.HOLDING
         else:
             self.phase = Phase.IDLE
@@ -182,8 +186,3 @@ class ArduPilotController(AltitudeController):
         loop.enter_position_mode(
             self._state, self._packed, body.altitude_m, body.climb_rate_m_s, self._accelerometer.value_m_s2
         )
-
-    def _stopping_distance_m(self, climb_m_s: float) -> float:
-        """Distance in which the trajectory comes to rest from this climb rate."""
-        acceleration, jerk = self._packed[loop.ACCELERATION], self._packed[loop.JERK]
-        return inverse_square_root(climb_m_s, 0.5 * jerk / acceleration, 0.5 * acceleration)

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
-from app.autopilots.px4.loop import SPACE, Px4Loop
 from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
 from app.autopilots.recording import LONGEST_INTERVAL_S, Recording, Refused, Rows, refusal
@@ -96,7 +96,7 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
         _manoeuvres(rows),
         refused,
         (TARGET, none_found),
-        SPACE.bounds,
+        Px4Loop.space.bounds,
         lambda _: "is missing",
     )
     parameters, logged_s = parameters_from(given), recording.columns["altitude_m"].interval_s

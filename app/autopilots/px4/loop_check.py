@@ -1,10 +1,11 @@
-"""PX4's entry in the registry: traces with a row per estimate of position, of the loop alone or of a flight."""
+"""PX4's entry in the registry: its on-board log, and traces of the loop alone or of a flight: described CSV, one row
+per estimate of position (`trace_table`)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
-from typing import Final
+from typing import BinaryIO, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +23,14 @@ from app.autopilots.loop_check import (
     result_of_trace,
 )
 from app.autopilots.px4.log import SOURCES, TARGET, read_px4
-from app.autopilots.px4.replica.parameters import DEFAULTS, UNSUPPORTED, Parameters, parameters_from
+from app.autopilots.px4.replica.parameters import DEFAULTS, STEP_S, UNSUPPORTED, Parameters, parameters_from
 from app.autopilots.px4.replica.replay import LoopLog, LoopTrace, Replay, replayed, replica_of
-from app.autopilots.px4.replica.vertical import FLIGHT, HOVER_MAX, HOVER_MIN, OUTPUTS, RAMP_UP
-from app.autopilots.px4.trace import COLUMNS, read_px4_trace
+from app.autopilots.px4.replica.vertical import FLIGHT, HOVER_MAX, HOVER_MIN, INPUTS, OUTPUTS, RAMP_UP
 from app.autopilots.recording import Recording, refusal
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.formats import Format
-from app.logs.trace_table import has_columns
+from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 
 _TOLERANCE: Final = 1e-5
 _PRECISION: Final = "firmware and replica compute in single precision"
@@ -74,6 +74,22 @@ _HINT: Final = (
 _SAME_RUN_S: Final = 0.004
 """A target is published at most so long after the position that it was computed from, the next position later."""
 
+_DERIVATIVE: Final = "z_derivative_m_s"
+_NEW: Final = "set_new"
+_MODE: Final = "offboard"
+_SETPOINTS: Final = ("set_z_m", "set_vz_m_s", "set_az_m_s2")
+_ALWAYS: Final = ("takeoff_state", "out_vz_m_s", "out_az_m_s2", "out_thrust")
+_MESSAGES: Final = ("armed", "landed", "ground_contact")
+_MAY_BE_EMPTY: Final = (
+    *_SETPOINTS, "hover_estimate", "out_vz_m_s", "out_az_m_s2", "out_thrust",
+    "az_m_s2", "true_z_m", *OUTPUTS[len(_ALWAYS):], _DERIVATIVE,
+)  # fmt: skip
+COLUMNS: Final = ("time_s", *(each for each in INPUTS if each not in (_DERIVATIVE, _NEW)), *_ALWAYS)
+_TRACE_HINT: Final = (
+    "A trace of PX4's loop has # and a JSON object with parameters, a header, and one row per estimate of position "
+    f"with the columns {','.join(COLUMNS)}."
+)
+
 
 def _examine_log(upload: Upload) -> Result:
     log = px4_loop_log(read_px4(upload.stream), name=upload.name)
@@ -90,19 +106,56 @@ def _examine_log(upload: Upload) -> Result:
 
 def _examine_trace(upload: Upload) -> Result:
     trace = read_px4_trace(upload.stream, name=upload.name)
-    replay = _replayed(trace)
+    computed = replayed(trace)
+    replay = TraceReplay(
+        time_s=trace.time_s,
+        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
+        replica=dict(zip(OUTPUTS, computed.outputs.T, strict=True)),
+        gains=trace.parameters.gains,
+        notes=(*_order_notes(computed), _DOWN),
+    ).compared
     return _judged_by_medians(replay, _MEDIANS, kind="trace") if trace.flown else result_of_trace(_SIGNALS, replay)
 
 
-def _replayed(trace: LoopTrace) -> TraceReplay:
-    replay = replayed(trace)
-    return TraceReplay(
-        time_s=trace.time_s,
-        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
-        replica=dict(zip(OUTPUTS, replay.outputs.T, strict=True)),
-        gains=trace.parameters.gains,
-        notes=(*_order_notes(replay), _DOWN),
-    ).compared
+def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
+    """Read a run, plain or gzipped. Where they were not recorded, the derivative of z is the difference of z, and
+    set-points count as new in a row where they change, under offboard control and outside of a flight in every row.
+
+    Raises InputError naming the line and the column or key of the first error.
+    """
+    table = read_trace_table(stream, name=name, columns=COLUMNS, may_be_empty=_MAY_BE_EMPTY)
+    checks, described = TraceChecks(name, _TRACE_HINT), table.description
+    checks.require_flags(table, (*_MESSAGES, "want_takeoff"))
+    checks.require_positive(table, "dt_s")
+    derived = {_DERIVATIVE: np.diff(table["z_m"], prepend=table["z_m"][0]) / table["dt_s"], _NEW: _new(table)}
+    unknown = np.full(len(table), np.nan)
+    known = derived | dict(table.columns)
+    inputs = np.ascontiguousarray(np.column_stack([known[each] for each in INPUTS]))
+    return LoopTrace(
+        parameters=parameters_from(checks.numbers_in(described, "parameters")),
+        filter_sample_s=checks.positive_in({"filter_sample_s": STEP_S} | dict(described), "filter_sample_s"),
+        flown=_MODE in known,
+        time_s=table["time_s"],
+        inputs=inputs,
+        late_inputs=_late(table, inputs),
+        outputs=np.ascontiguousarray(np.column_stack([table.columns.get(each, unknown) for each in OUTPUTS])),
+    )
+
+
+def _new(table: TraceTable) -> Samples:
+    """1 in rows with set-points that arrived since the row before, shape (n,)."""
+    given = np.column_stack([table[each] for each in _SETPOINTS])
+    changed = np.append(True, ~_equal(given[1:], given[:-1]).all(axis=1))
+    return np.where(table[_MODE] > 0.0, 1.0, changed) if _MODE in table.columns else np.ones(len(table))
+
+
+def _late(table: TraceTable, inputs: Samples) -> Samples:
+    """Inputs if each message with the time stamp of a flight's row was read in the next row, shape (n, 15). Set-points
+    of auto modes are computed from the estimate of the row, before the loop runs, so that they are never late."""
+    if _MODE not in table.columns:
+        return inputs
+    may_be_late = np.isin(INPUTS, _MESSAGES) | (np.isin(INPUTS, (*_SETPOINTS, _NEW)) & (table[_MODE] > 0.0)[:, None])
+    return np.where(may_be_late, np.concatenate([inputs[:1], inputs[:-1]]), inputs)
 
 
 def _order_notes(replay: Replay) -> Iterable[str]:
@@ -233,8 +286,7 @@ def _set_points(recording: Recording, time_s: Samples, set_z_m: Samples) -> tupl
 
 
 def _equal(one: Samples, other: Samples) -> NDArray[np.bool_]:
-    equal: NDArray[np.bool_] = (one == other) | (np.isnan(one) & np.isnan(other))
-    return equal
+    return np.asarray((one == other) | (np.isnan(one) & np.isnan(other)))
 
 
 def _hover(recording: Recording, time_s: Samples, takeoff: Samples, parameters: Parameters) -> Samples:

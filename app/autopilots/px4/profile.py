@@ -24,8 +24,6 @@ from app.autopilots.px4.replica.parameters import (
 from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import InputError
 
-TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
-
 _HOVER: Final = "MPC_THR_HOVER"
 _RUN_PREARM_CHECKS: Final = 401
 _AUTO: Final = 4
@@ -93,16 +91,6 @@ def _event(message: Message) -> VehicleEvent:
     return VehicleEvent(int(number(message, "id")), int(number(message, "sequence")), arguments)
 
 
-_READERS: Final[mavlink.Readers] = {
-    **mavlink.READERS,
-    "HEARTBEAT": _heartbeat,
-    "PARAM_VALUE": _parameter,
-    "EVENT": _event,
-    "ATTITUDE_TARGET": mavlink.commanded_throttle,
-    "POSITION_TARGET_LOCAL_NED": mavlink.target_altitude,
-}
-
-
 def _simulated() -> tuple[SimulatedKind, ...]:
     from app.autopilots.px4.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
 
@@ -144,8 +132,15 @@ PX4: Final = Autopilot(
             "COM_FAIL_ACT_T", "5 s or less (in which it holds before it lands)", least=0.0, most=5.0, may_lack=True
         ),
     ),
-    takeoff_parameter=TAKE_OFF_ALTITUDE,
-    readers=_READERS,
+    takeoff_parameter="MIS_TAKEOFF_ALT",
+    readers={
+        **mavlink.READERS,
+        "HEARTBEAT": _heartbeat,
+        "PARAM_VALUE": _parameter,
+        "EVENT": _event,
+        "ATTITUDE_TARGET": mavlink.commanded_throttle,
+        "POSITION_TARGET_LOCAL_NED": mavlink.target_altitude,
+    },
     telemetry=commands.COPTER_TELEMETRY,
     set_point_telemetry=(commands.FOLLOWED_TARGET, commands.DEMANDED_THROTTLE),
     arming_checks=Px4ArmingChecks,

@@ -1,6 +1,6 @@
 """Simulated PX4.
 
-Its altitude is controlled by the replica of PX4's vertical loop; see px4_control.py. OFFBOARD takes set points of
+Its altitude is controlled by the replica of PX4's vertical loop; see simulated_control.py. OFFBOARD takes set points of
 position, velocity and acceleration, of which only the vertical parts act.
 """
 
@@ -10,7 +10,7 @@ import struct
 from types import MappingProxyType
 from typing import ClassVar, Final
 
-from app.autopilots.dialects import COMMON, FieldValue
+from app.autopilots.dialects import COMMON
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
 from app.autopilots.px4.replica import parameters as loop
 from app.autopilots.px4.simulated_control import Px4Controller
@@ -18,7 +18,6 @@ from app.autopilots.simulated.body import ACCEPTED, TEMPORARILY_REJECTED, Body, 
 from app.autopilots.simulated.copter import Copter, copter_kind
 from app.autopilots.simulated.copter_control import Phase, SetPoint
 from app.autopilots.simulated.copter_parameters import (
-    BYTEWISE,
     Behaviour,
     FirmwareProfile,
     FlightMode,
@@ -95,7 +94,7 @@ class Px4(Copter):
             Parameter("MAV_SYS_ID", Kind.INT32, 1),
             Parameter("SYS_AUTOSTART", Kind.INT32, 4001),
         ),
-        coding=BYTEWISE,
+        is_bytewise=True,
         periods_s=MappingProxyType(
             {
                 "HEARTBEAT": 1.0,
@@ -198,16 +197,18 @@ class Px4(Copter):
 
     def _send_event(self, number: int, *arguments: int, layout: str, levels: int = _PROTOCOL) -> None:
         """Send an event as a broadcast."""
-        fields: dict[str, FieldValue] = {
-            "id": number,
-            "event_time_boot_ms": self.boot_ms,
-            "sequence": self._events % _SEQUENCE_NUMBERS,
-            "destination_component": 0,
-            "destination_system": 0,
-            "log_levels": levels,
-            "arguments": struct.pack(layout, *arguments).ljust(_ARGUMENTS, b"\0"),
-        }
-        self._send("EVENT", fields)
+        self._send(
+            "EVENT",
+            {
+                "id": number,
+                "event_time_boot_ms": self.boot_ms,
+                "sequence": self._events % _SEQUENCE_NUMBERS,
+                "destination_component": 0,
+                "destination_system": 0,
+                "log_levels": levels,
+                "arguments": struct.pack(layout, *arguments).ljust(_ARGUMENTS, b"\0"),
+            },
+        )
         self._events += 1
 
     def tune(self) -> None:
@@ -275,11 +276,16 @@ class Px4(Copter):
         return self.parameters["COM_DISARM_PRFLT"]
 
 
-_FAILSAFES: Final = {
-    "NAV_DLL_ACT": 3.0,  # land
-    "GF_ACTION": 5.0,  # land
-    "GF_MAX_VER_DIST": 10.0,
-    "COM_OBL_RC_ACT": 4.0,  # land without set points
-}
-
-KINDS: Final = (copter_kind("px4", "PX4", Px4, _FAILSAFES),)
+KINDS: Final = (
+    copter_kind(
+        "px4",
+        "PX4",
+        Px4,
+        failsafes={
+            "NAV_DLL_ACT": 3.0,  # land
+            "GF_ACTION": 5.0,  # land
+            "GF_MAX_VER_DIST": 10.0,
+            "COM_OBL_RC_ACT": 4.0,  # land without set points
+        },
+    ),
+)

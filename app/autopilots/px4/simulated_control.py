@@ -11,12 +11,14 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.px4 import simulated_hover as px4_hover
 from app.autopilots.px4.replica import vertical as loop
-from app.autopilots.px4.replica.parameters import parameters_from
+from app.autopilots.px4.replica.parameters import hover_limits, parameters_from
 from app.autopilots.px4.simulated_trajectory import Limits, Trajectory
 from app.autopilots.simulated.body import TICK_S, Body
 from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
+from app.core.kernels import kernel
+from app.core.models.copter import GRAVITY_M_S2
+from app.core.records.trajectory import Samples
 
 LOOP_TICKS: Final = 2
 LOOP_S: Final = LOOP_TICKS * TICK_S
@@ -31,6 +33,62 @@ _AUTO_MARGIN: Final = 1.2
 """Of the limits of the controller over those of the trajectory in auto modes."""
 _LEAST: Final = 0.01
 """Limits of the trajectory must be positive; smaller parameters act as this."""
+
+_HOVER_THRUST, _VARIANCE, _NOISE_VARIANCE, _MEAN_INNOVATION, _MEAN_RATIO, _STEADY_S = range(6)
+"""Indices in the state array of the estimator."""
+_FIRST_NOISE_VARIANCE: Final = 5.0
+_NOISE_S: Final = 2.0
+_INNOVATION_S: Final = 1.0
+_BIASED_ABOVE: Final = 0.2
+_FORGETTING: Final = 1000.0
+_VALID_BELOW: Final = 0.001
+_VALID_AFTER_S: Final = 2.0
+_LEAST_THRUST: Final = 0.05
+
+
+def estimator_settings(values: Mapping[str, float]) -> Samples:
+    """Return the constants of `estimate_hover`, shape (5,), from parameters by the firmware's names."""
+    low, highest = hover_limits(values["MPC_THR_HOVER"], values["HTE_THR_RANGE"])
+    lowest = max(low, _LEAST_THRUST)
+    return np.array([values["HTE_HT_NOISE"], values["HTE_ACC_GATE"], lowest, highest, values["HTE_VZ_THR"]])
+
+
+def started_estimate(values: Mapping[str, float]) -> Samples:
+    """Return the state of the estimator while disarmed, shape (6,): MPC_THR_HOVER."""
+    return np.array([values["MPC_THR_HOVER"], values["HTE_HT_ERR_INIT"] ** 2, _FIRST_NOISE_VARIANCE, 0.0, 0.0, 0.0])
+
+
+@kernel
+def estimate_hover(state: Samples, settings: Samples, a: float, thrust: float, climb: float, dt: float) -> float:
+    """Advance PX4's estimator of the hover thrust, a Kalman filter of one state, by `dt`, s, with the acceleration `a`,
+    m/s² up, under `thrust`, a share of full, at the climb rate `climb`, m/s; return the estimate, or NaN until it is
+    valid. `settings` are those of `estimator_settings`."""
+    grown = (settings[0] * dt) ** 2
+    hover, variance = state[_HOVER_THRUST], state[_VARIANCE] + grown
+    slope = -GRAVITY_M_S2 * thrust / (hover * hover)
+    noise = state[_NOISE_VARIANCE] * max(1.0, abs(climb) - settings[4] + 1.0) ** 2
+    total = slope * slope * variance + noise
+    innovation = a - GRAVITY_M_S2 * (thrust / hover - 1.0)
+    ratio = innovation * innovation / (settings[1] * settings[1] * total)
+    if ratio < 1.0:
+        gain = variance * slope / total
+        hover = min(max(hover + gain * innovation, settings[2]), settings[3])
+        variance = min(max((1.0 - gain * slope) * variance, 1e-10), 1.0)
+        innovation = a - GRAVITY_M_S2 * (thrust / hover - 1.0)
+    elif abs(state[_MEAN_RATIO]) > _BIASED_ABOVE:
+        variance += _FORGETTING * grown
+    state[_HOVER_THRUST], state[_VARIANCE] = hover, variance
+    share = dt / (_INNOVATION_S + dt)
+    state[_MEAN_RATIO] += share * (math.copysign(min(ratio, 1.0), innovation) - state[_MEAN_RATIO])
+    state[_MEAN_INNOVATION] += share * (innovation - state[_MEAN_INNOVATION])
+    scatter = (innovation - state[_MEAN_INNOVATION]) ** 2 + slope * slope * variance
+    noise_variance = state[_NOISE_VARIANCE] + dt / (_NOISE_S + dt) * (scatter - state[_NOISE_VARIANCE])
+    state[_NOISE_VARIANCE] = min(max(noise_variance, 1.0), 400.0)
+    was_valid = state[_STEADY_S] >= _VALID_AFTER_S
+    is_steady = variance < _VALID_BELOW and (ratio < 1.0 or was_valid)
+    state[_STEADY_S] = state[_STEADY_S] + dt if is_steady else 0.0
+    estimate: float = hover if state[_STEADY_S] >= _VALID_AFTER_S else math.nan
+    return estimate
 
 
 class Px4Controller(AltitudeController):
@@ -54,7 +112,7 @@ class Px4Controller(AltitudeController):
         self._tick = 0
         self._climb_m_s = 0.0
         self.tune(values)
-        self._estimate = self._hover.start()
+        self._estimate = self._disarmed_estimate.copy()
         self._estimates = False
         self._compile()
 
@@ -63,7 +121,7 @@ class Px4Controller(AltitudeController):
         state = self._state.copy()
         loop.start(state, self._packed)
         loop.rollout(state, self._packed, self.inputs, self.outputs.copy())
-        px4_hover.update(self._hover.start(), self._hover_packed, 0.0, self.demand, 0.0, LOOP_S)
+        estimate_hover(self._estimate.copy(), self._estimator, 0.0, self.demand, 0.0, LOOP_S)
 
     def tune(self, values: Mapping[str, float]) -> None:
         """Use these parameters, by the firmware's names, from the next run on. Raises InputError if the loop is not
@@ -77,22 +135,16 @@ class Px4Controller(AltitudeController):
         self._takeoff = Limits(speed, min(self._up.acceleration_m_s2, gentle), jerk)
         self._land_m_s = positive["MPC_LAND_SPEED"]
         self._fast_up_m_s, self._fast_down_m_s = values["MPC_Z_VEL_MAX_UP"], values["MPC_Z_VEL_MAX_DN"]
-        self._hover = px4_hover.HoverSettings(
-            hover_thrust=positive["MPC_THR_HOVER"],
-            initial_error=values["HTE_HT_ERR_INIT"],
-            noise_1_s=values["HTE_HT_NOISE"],
-            gate=positive["HTE_ACC_GATE"],
-            range=values["HTE_THR_RANGE"],
-            fast_m_s=values["HTE_VZ_THR"],
-        )
-        self._hover_packed = self._hover.packed()
+        hover = {**values, "MPC_THR_HOVER": positive["MPC_THR_HOVER"], "HTE_ACC_GATE": positive["HTE_ACC_GATE"]}
+        self._estimator = estimator_settings(hover)
+        self._disarmed_estimate = started_estimate(hover)
 
     # ------------------------------------------------------------ commands
 
     def arm(self) -> None:
         super().arm()
         loop.start(self._state, self._packed)
-        self._estimate = self._hover.start()
+        self._estimate = self._disarmed_estimate.copy()
 
     def take_off(self, height_m: float) -> None:
         self._goal_m, self._follows = height_m, False
@@ -211,7 +263,7 @@ class Px4Controller(AltitudeController):
         if not self._estimates:
             return math.nan
         acceleration_m_s2 = (climb_m_s - before_m_s) / LOOP_S
-        return px4_hover.update(self._estimate, self._hover_packed, acceleration_m_s2, self.demand, climb_m_s, LOOP_S)
+        return estimate_hover(self._estimate, self._estimator, acceleration_m_s2, self.demand, climb_m_s, LOOP_S)
 
     def _start_trajectory(self) -> None:
         """Begin the trajectory of an auto mode; a running one goes on."""

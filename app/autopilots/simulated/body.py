@@ -94,7 +94,9 @@ class Body:
             command = MOTORS_OFF
         wants_to_rest = command.mode == THROTTLE and command.target == 0
         if wants_to_rest and (self._flight is None or self.stands):
-            self._rest()
+            self._flight = None
+            self.altitude_m = self.climb_rate_m_s = self.thrust = 0.0
+            self.battery_v = FULL_BATTERY_V
             return
         if self._flight is None:
             self._flight = self._launch(self._seed)
@@ -106,11 +108,6 @@ class Body:
         """Empty the vertical loop's integrator."""
         if self._flight is not None:
             self._flight.forget_error_sum()
-
-    def _rest(self) -> None:
-        self._flight = None
-        self.altitude_m = self.climb_rate_m_s = self.thrust = 0.0
-        self.battery_v = FULL_BATTERY_V
 
 
 Fields = Mapping[str, FieldValue]
@@ -213,10 +210,6 @@ class SimulatedAutopilot(ABC):
     def boot_ms(self) -> int:
         return int(self.boot_s * 1000.0)
 
-    def held(self, parameter: str) -> float:
-        """Return the true value of a parameter, whatever was sent. Raises KeyError for an unknown name."""
-        return self.parameters[parameter]
-
     def tick(self) -> list[OutgoingMessage]:
         """Advance by one tick of TICK_S; return the messages to send."""
         self._ticks += 1
@@ -251,8 +244,10 @@ class SimulatedAutopilot(ABC):
 
 def attitude(now: SimulatedAutopilot) -> Fields:
     """Return ATTITUDE, which is level."""
-    still = dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
-    return {"time_boot_ms": now.boot_ms, **still}
+    return {
+        "time_boot_ms": now.boot_ms,
+        **dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), 0.0),
+    }
 
 
 def system_time(now: SimulatedAutopilot) -> Fields:
@@ -261,9 +256,13 @@ def system_time(now: SimulatedAutopilot) -> Fields:
 
 def version(flight_software: int, *, capabilities: int = 0, uid: int = 0) -> Fields:
     """Return AUTOPILOT_VERSION."""
-    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
-    others = dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0)
-    return {"capabilities": capabilities, "flight_sw_version": flight_software, "uid": uid, **others, **custom}
+    return {
+        "capabilities": capabilities,
+        "flight_sw_version": flight_software,
+        "uid": uid,
+        **dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0),
+        **dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8),
+    }
 
 
 def sender(message: Message) -> dict[str, int]:

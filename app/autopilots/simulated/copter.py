@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Final, Self
 
-from app.autopilots.dialects import FieldValue, Message, is_known, number, text
+from app.autopilots.dialects import Message, is_known, number, text
 from app.autopilots.simulated.body import (
     ACCEPTED,
     FAILED,
@@ -16,7 +16,7 @@ from app.autopilots.simulated.body import (
     whole_ticks,
 )
 from app.autopilots.simulated.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
-from app.autopilots.simulated.copter_parameters import Behaviour, FlightMode, Reaction
+from app.autopilots.simulated.copter_parameters import Behaviour, FlightMode, Reaction, decoded, encoded
 from app.autopilots.simulated.copter_telemetry import REPORTS, ReportingCopter
 
 FORCE: Final = 21196
@@ -232,18 +232,16 @@ class Copter(ReportingCopter):
         if place >= len(self.parameters):
             return
         parameter, value = self.parameters.at(place)
-        fields: dict[str, FieldValue] = {
-            "param_id": parameter.name,
-            "param_value": self.firmware.coding.encode(value, parameter.kind),
-            "param_type": int(parameter.kind),
-            "param_count": len(self.parameters),
-            "param_index": place,
-        }
-        self._send("PARAM_VALUE", fields)
-
-    def _acknowledge(self, message: Message, command: int, result: int) -> None:
-        done = {"command": command, "result": result, "progress": 0, "result_param2": 0}
-        self._send("COMMAND_ACK", {**done, **sender(message)})
+        self._send(
+            "PARAM_VALUE",
+            {
+                "param_id": parameter.name,
+                "param_value": encoded(value, parameter.kind, bytewise=self.firmware.is_bytewise),
+                "param_type": int(parameter.kind),
+                "param_count": len(self.parameters),
+                "param_index": place,
+            },
+        )
 
     # ------------------------------------------------------------ receiving
 
@@ -257,9 +255,9 @@ class Copter(ReportingCopter):
         if place is None or self.ignores_parameters:
             return
         parameter, _ = self.parameters.at(place)
-        coding = self.firmware.coding
-        fits = not coding.is_strict or number(message, "param_type") == parameter.kind
-        value = coding.decode(number(message, "param_value"), parameter.kind)
+        is_bytewise = self.firmware.is_bytewise
+        fits = not is_bytewise or number(message, "param_type") == parameter.kind
+        value = decoded(number(message, "param_value"), parameter.kind, bytewise=is_bytewise)
         if fits and value is not None:
             self.parameters[parameter.name] = value
             self.tune()
@@ -267,14 +265,13 @@ class Copter(ReportingCopter):
 
     def _on_set_mode(self, message: Message) -> None:
         """Set the mode by the older message, which has no reply."""
-        custom = int(number(message, "custom_mode"))
-        mode = self.mode_numbered(custom)
+        mode = self.mode_numbered(int(number(message, "custom_mode")))
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
             self._enter_if_allowed(mode)
 
     def _on_position_target(self, message: Message) -> None:
         if int(number(message, "coordinate_frame")) == LOCAL_NED:
-            target = SetPoint.from_message(message).above(self.firmware.ground_m)
+            target = SetPoint.from_message(message, ground_m=self.firmware.ground_m)
             self.follow(target, int(number(message, "type_mask")))
 
     def _on_data_stream(self, message: Message) -> None:
@@ -287,21 +284,21 @@ class Copter(ReportingCopter):
         command = int(number(message, "command"))
         handler = _COMMANDS.get(command)
         result = UNSUPPORTED if handler is None else handler(self, message)
-        self._acknowledge(message, command, result)
+        done = {"command": command, "result": result, "progress": 0, "result_param2": 0}
+        self._send("COMMAND_ACK", {**done, **sender(message)})
 
     def _handle_arm(self, message: Message) -> int:
         force = number(message, "param2") == FORCE
         if number(message, "param1") > 0.5:
             return self._arm(force=force)
-        if not (self.controller.is_landed or force):
+        if not (self.body.stands or force):
             self.send_text(self.firmware.not_landed)
             return self.firmware.refused
         self.kill()
         return ACCEPTED
 
     def _handle_mode(self, message: Message) -> int:
-        main, sub = number(message, "param2"), number(message, "param3")
-        mode = self.requested_mode(_whole(main), _whole(sub))
+        mode = self.requested_mode(_whole(number(message, "param2")), _whole(number(message, "param3")))
         if mode is None or not _whole(number(message, "param1")) & _CUSTOM_MODE:
             return FAILED
         return self._enter_if_allowed(mode)

@@ -4,7 +4,8 @@ the two controllers, which fly by the exact replicas of ArduCopter's and PX4's v
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
@@ -13,10 +14,8 @@ from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, 
 
 LOCAL_NED: Final = 1
 """MAV_FRAME."""
-IGNORE_Z: Final = 1 << 2
-IGNORE_VZ: Final = 1 << 5
-IGNORE_AZ: Final = 1 << 8
-"""Bits of POSITION_TARGET_TYPEMASK."""
+IGNORED_BY: Final[Mapping[str, int]] = {"z": 1 << 2, "vz": 1 << 5, "afz": 1 << 8}
+"""Bits of POSITION_TARGET_TYPEMASK for the vertical fields of a position message."""
 
 _LANDED_AFTER_S: Final = 1.0
 
@@ -41,22 +40,15 @@ class SetPoint:
     @property
     def given(self) -> list[float]:
         """The values that are given."""
-        values = (self.altitude_m, self.climb_m_s, self.acceleration_m_s2)
-        return [value for value in values if not math.isnan(value)]
-
-    def above(self, datum_m: float) -> "SetPoint":
-        """Return it with an altitude above a datum at this height."""
-        return replace(self, altitude_m=self.altitude_m - datum_m)
+        return [each for each in (self.altitude_m, self.climb_m_s, self.acceleration_m_s2) if not math.isnan(each)]
 
     @classmethod
-    def from_message(cls, message: Message) -> "SetPoint":
-        """Return the vertical part of SET_POSITION_TARGET_LOCAL_NED; its altitude is in the local frame."""
+    def from_message(cls, message: Message, *, ground_m: float) -> "SetPoint":
+        """Return the vertical part of SET_POSITION_TARGET_LOCAL_NED; `ground_m` is the height of the ground in its
+        frame."""
         mask = int(number(message, "type_mask"))
-        z, vz, az = (
-            math.nan if mask & ignored else -number(message, name)
-            for name, ignored in (("z", IGNORE_Z), ("vz", IGNORE_VZ), ("afz", IGNORE_AZ))
-        )
-        return cls(z, vz, az)
+        z, vz, az = (math.nan if mask & ignored else -number(message, name) for name, ignored in IGNORED_BY.items())
+        return cls(z - ground_m, vz, az)
 
 
 class AltitudeController(ABC):
@@ -102,11 +94,6 @@ class AltitudeController(ABC):
         """Throttle that the loop has demanded last, 0 … 1, before any filter of the motors."""
 
     # ------------------------------------------------------------ common to both
-
-    @property
-    def is_landed(self) -> bool:
-        """Whether it is on the ground, by height and speed."""
-        return self._body.stands
 
     @property
     def flies(self) -> bool:

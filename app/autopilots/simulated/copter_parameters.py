@@ -4,7 +4,7 @@ two differ: modes, rates, texts.
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
@@ -64,46 +64,22 @@ class Parameters:
         return self._known[place], self._values[place]
 
 
-@dataclass(frozen=True, slots=True)
-class Coding:
-    """Encoding of values: `encode(value, kind)` returns the float of the message, `decode(float, kind)` the value, or
-    None if it is invalid. `is_strict`: a message with a wrong type changes nothing."""
-
-    encode: Callable[[float, Kind], float]
-    decode: Callable[[float, Kind], float | None]
-    is_strict: bool
-
-
-def _as_number(value: float, _kind: Kind) -> float:
-    return value
-
-
-def _from_number(carried: float, kind: Kind) -> float | None:
-    """Decode a value; integers are rounded."""
-    if not math.isfinite(carried):
-        return None
-    return carried if kind is Kind.REAL32 else float(round(carried))
-
-
-def _as_bytes(value: float, kind: Kind) -> float:
-    if kind is Kind.REAL32:
+def encoded(value: float, kind: Kind, *, bytewise: bool) -> float:
+    """Return the float that carries a value: the number itself, or `bytewise` the four bytes of an integer."""
+    if kind is Kind.REAL32 or not bytewise:
         return value
     (carried,) = struct.unpack("<f", struct.pack("<i", int(value)))
     return float(carried)
 
 
-def _from_bytes(carried: float, kind: Kind) -> float | None:
-    if kind is Kind.REAL32:
-        return carried if math.isfinite(carried) else None
-    (value,) = struct.unpack("<i", struct.pack("<f", carried))
-    return float(value)
-
-
-BY_VALUE = Coding(_as_number, _from_number, is_strict=False)
-"""ArduPilot: the number itself for all types; the type of the message is ignored."""
-
-BYTEWISE = Coding(_as_bytes, _from_bytes, is_strict=True)
-"""PX4: the four bytes of an integer as those of a float."""
+def decoded(carried: float, kind: Kind, *, bytewise: bool) -> float | None:
+    """Return the value that a float carries, or None if it is invalid; integers sent as numbers are rounded."""
+    if bytewise and kind is not Kind.REAL32:
+        (value,) = struct.unpack("<i", struct.pack("<f", carried))
+        return float(value)
+    if not math.isfinite(carried):
+        return None
+    return carried if kind is Kind.REAL32 else float(round(carried))
 
 
 class Behaviour(Enum):
@@ -145,7 +121,9 @@ class FirmwareProfile:
     autopilot: int
     version: int
     parameters: tuple[Parameter, ...]
-    coding: Coding
+    is_bytewise: bool = False
+    """Whether an integer is sent as its four bytes, and a message with a wrong type changes nothing, as in PX4; else it
+    is sent as a number, and the type of the message is ignored."""
     periods_s: Mapping[str, float]
     """Periods of the messages that it sends unrequested."""
     streams: tuple[str, ...]

@@ -5,11 +5,18 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import ClassVar, Final
 
-from app.autopilots.simulated.body import ARMED, Body, Fields, SimulatedAutopilot, attitude, system_time, version
+from app.autopilots.simulated.body import (
+    ARMED,
+    FULL_BATTERY_V,
+    Body,
+    Fields,
+    SimulatedAutopilot,
+    attitude,
+    system_time,
+    version,
+)
 from app.autopilots.simulated.copter_control import (
-    IGNORE_AZ,
-    IGNORE_VZ,
-    IGNORE_Z,
+    IGNORED_BY,
     LOCAL_NED,
     AltitudeController,
     Phase,
@@ -19,7 +26,6 @@ from app.autopilots.simulated.copter_parameters import FirmwareProfile, Paramete
 LATITUDE_E7: Final = 473977420
 LONGITUDE_E7: Final = 85455940
 HOME_AMSL_M: Final = 488.0
-FULL_V: Final = 11.1
 
 ESTIMATE_AFTER_S: Final = 3.0
 """Time from the start until the position is known well enough to arm and to be sent."""
@@ -72,7 +78,7 @@ class ReportingCopter(SimulatedAutopilot):
 
     @property
     def charge_percent(self) -> int:
-        return round(min(max((self.body.battery_v / FULL_V - 0.8) / 0.2, 0.0), 1.0) * 100.0)
+        return round(min(max((self.body.battery_v / FULL_BATTERY_V - 0.8) / 0.2, 0.0), 1.0) * 100.0)
 
     def send_text(self, text: str) -> None:
         """Send a critical STATUSTEXT; a long text is sent in several chunks with one number."""
@@ -95,11 +101,15 @@ def heartbeat(now: ReportingCopter) -> Fields:
 
 
 def local_position(now: ReportingCopter) -> Fields:
-    down = {
+    return {
+        "time_boot_ms": now.boot_ms,
+        "x": now.body.north_m,
+        "y": 0.0,
         "z": -(now.body.altitude_m + now.firmware.ground_m),
+        "vx": now.body.north_m_s,
+        "vy": 0.0,
         "vz": -now.body.climb_rate_m_s - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
     }
-    return {"time_boot_ms": now.boot_ms, "x": now.body.north_m, "y": 0.0, "vx": now.body.north_m_s, "vy": 0.0, **down}
 
 
 def global_position(now: ReportingCopter) -> Fields:
@@ -121,7 +131,7 @@ def position_target(now: ReportingCopter) -> Fields:
     given = now.controller.set_point
     up = {"z": given.altitude_m + now.firmware.ground_m, "vz": given.climb_m_s, "afz": given.acceleration_m_s2}
     missing = {name for name, value in up.items() if math.isnan(value)}
-    ignored = sum(bit for name, bit in (("z", IGNORE_Z), ("vz", IGNORE_VZ), ("afz", IGNORE_AZ)) if name in missing)
+    ignored = sum(IGNORED_BY[name] for name in missing)
     return {
         "time_boot_ms": now.boot_ms,
         "coordinate_frame": LOCAL_NED,
@@ -132,15 +142,22 @@ def position_target(now: ReportingCopter) -> Fields:
 
 
 def attitude_target(now: ReportingCopter) -> Fields:
-    level = {"type_mask": 0, "q": [1.0, 0.0, 0.0, 0.0]}
-    rates = dict.fromkeys(("body_roll_rate", "body_pitch_rate", "body_yaw_rate"), 0.0)
-    return {"time_boot_ms": now.boot_ms, **level, **rates, "thrust": now.controller.demand}
+    """Return ATTITUDE_TARGET, which is level."""
+    return {
+        "time_boot_ms": now.boot_ms,
+        "type_mask": 0,
+        "q": [1.0, 0.0, 0.0, 0.0],
+        **dict.fromkeys(("body_roll_rate", "body_pitch_rate", "body_yaw_rate"), 0.0),
+        "thrust": now.controller.demand,
+    }
 
 
 def controller_output(now: ReportingCopter) -> Fields:
-    whole = dict.fromkeys(("nav_bearing", "target_bearing", "wp_dist"), 0)
-    rest = dict.fromkeys(("nav_roll", "nav_pitch", "aspd_error", "xtrack_error"), 0.0)
-    return {**whole, **rest, "alt_error": now.controller.error_m}
+    return {
+        **dict.fromkeys(("nav_bearing", "target_bearing", "wp_dist"), 0),
+        **dict.fromkeys(("nav_roll", "nav_pitch", "aspd_error", "xtrack_error"), 0.0),
+        "alt_error": now.controller.error_m,
+    }
 
 
 def vfr_hud(now: ReportingCopter) -> Fields:
@@ -157,7 +174,6 @@ def vfr_hud(now: ReportingCopter) -> Fields:
 def sys_status(now: ReportingCopter) -> Fields:
     """Return SYS_STATUS. PX4 sets the bit of its arming checks in the health alone, since release 1.14."""
     present = _SENSORS | (_PREARM if now.firmware.autopilot == _ARDUPILOT else 0)
-    errors = dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
     return {
         "onboard_control_sensors_present": present,
         "onboard_control_sensors_enabled": present,
@@ -166,7 +182,7 @@ def sys_status(now: ReportingCopter) -> Fields:
         "voltage_battery": round(now.body.battery_v * 1000.0),
         "current_battery": -1,
         "battery_remaining": now.charge_percent,
-        **errors,
+        **dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0),
     }
 
 
@@ -200,9 +216,13 @@ def gps_raw(now: ReportingCopter) -> Fields:
 
 
 def home_position(_now: ReportingCopter) -> Fields:
-    place = {"latitude": LATITUDE_E7, "longitude": LONGITUDE_E7, "altitude": round(HOME_AMSL_M * 1000.0)}
-    zeros = dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), 0.0)
-    return {**place, **zeros, "q": [1.0, 0.0, 0.0, 0.0]}
+    return {
+        "latitude": LATITUDE_E7,
+        "longitude": LONGITUDE_E7,
+        "altitude": round(HOME_AMSL_M * 1000.0),
+        **dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), 0.0),
+        "q": [1.0, 0.0, 0.0, 0.0],
+    }
 
 
 def extended_state(now: ReportingCopter) -> Fields:

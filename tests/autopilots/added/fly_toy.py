@@ -37,7 +37,7 @@ def use_toy() -> dict[str, object]:
     with LockstepRig("toy") as rig:
         vehicle = rig.vehicle(safe)
         failed = [item.name for item in vehicle.check() if not item.passed]
-        staged, on_board = vehicle.stage(tuned), rig.drone.autopilot.held("TOY_P")
+        staged, on_board = vehicle.stage(tuned), rig.drone.autopilot.parameters["TOY_P"]
         record = vehicle.fly(FlightOptions(seed=1, window_s=12.0), on_sample=unwatched, should_stop=never)
         held = vehicle.read_gains()
         vehicle.close()

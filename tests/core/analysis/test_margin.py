@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.replica import vertical as loop
-from app.autopilots.ardupilot.replica.copter import fly
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.margin import (
     EXTRA_LAG_S,
@@ -84,7 +83,7 @@ def test_the_damping_is_that_of_an_oscillation_as_it_dies_away() -> None:
     body = start_body(RACER.hover_throttle, 0.0, 0.0, 0.0, copter)
     disturbances = np.zeros((800, len(DISTURBANCES)))
     disturbances[:5, 0] = 0.01
-    fly(state, body, packed, copter, np.zeros((800, len(REFERENCE))), disturbances, flown)
+    loop.fly(state, body, packed, copter, np.zeros((800, len(REFERENCE))), disturbances, flown)
     fast = np.diff(flown[:, FLOWN.index("a_m_s2")])[40:400]
     peaks = np.flatnonzero((fast[1:-1] > fast[:-2]) & (fast[1:-1] > fast[2:]) & (fast[1:-1] > 1e-9)) + 1
     heights = fast[peaks][:6]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.core.analysis.margin import REQUIRED_MARGIN, RINGING_DAMPING, gain_margin, least_damping
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.proposal import LARGEST_ACTIVITY, propose

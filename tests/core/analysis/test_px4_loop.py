@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.autopilots.px4.loop import SPACE, Px4Loop
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.replica.parameters import STEP_S, Parameters
 from app.core.analysis.analysis import analyze
 from app.core.analysis.loop import GainSpace
@@ -26,7 +26,7 @@ STIFF = (1.5, 8.0, 3.0, 0.0)
 
 
 def with_gains(loop: Px4Loop, *values: float) -> Px4Loop:
-    return loop.with_gains(dict(zip(SPACE.bounds, values, strict=True)))
+    return loop.with_gains(dict(zip(Px4Loop.space.bounds, values, strict=True)))
 
 
 def flown_error_m(copter: SimulatedCopter, gains: dict[str, float]) -> float:
@@ -81,7 +81,7 @@ def test_soft_gains_are_answered_by_better_ones_than_the_defaults_within_the_lim
     assert found.proposed is not None
     flown, defaults, *_ = found.assessments
     gains = dict(found.proposed.gains)
-    assert all(low <= gains[name] <= high for name, (low, high) in SPACE.bounds.items())
+    assert all(low <= gains[name] <= high for name, (low, high) in Px4Loop.space.bounds.items())
     assert found.proposed.activity <= 1.5
     assert found.proposed.margin >= 2.0
     assert found.proposed.prediction.error_m < min(0.6 * flown.prediction.error_m, defaults.prediction.error_m)

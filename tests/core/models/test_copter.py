@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.replica import vertical as loop
-from app.autopilots.ardupilot.replica.copter import fly, step
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.core.models.copter import (
     ALTITUDE,
@@ -35,7 +34,7 @@ def flown(disturbances: Samples, *, parameters: Parameters = PARAMETERS, z_m: fl
     state, found = np.empty(loop.STATE_SIZE), np.empty((len(disturbances), len(FLOWN)))
     loop.start_hover(state, packed, COPTER.hover_throttle, z_m, 0.0, 0.0)
     body = start_body(COPTER.hover_throttle, z_m, 0.0, 0.0, copter)
-    fly(state, body, packed, copter, np.zeros((len(disturbances), len(REFERENCE))), disturbances, found)
+    loop.fly(state, body, packed, copter, np.zeros((len(disturbances), len(REFERENCE))), disturbances, found)
     return found
 
 
@@ -74,7 +73,7 @@ def test_a_step_without_control_obeys_the_equation_of_motion() -> None:
     packed, state = loop.packed(idle), np.empty(loop.STATE_SIZE)
     loop.start_hover(state, packed, 0.44, 0.0, 2.0, 0.0)
     body = start_body(0.44, 0.0, 2.0, 0.0, copter)
-    step(state, body, packed, copter, np.zeros(3), np.array([0.5, 0.125, 0.0]))
+    loop.step(state, body, packed, copter, np.zeros(3), np.array([0.5, 0.125, 0.0]))
     a = GRAVITY_M_S2 * (1.1**1.2 - 1.0) - 0.3 * 2.0 + 0.5
     v = 2.0 + STEP_S * a
     assert body[LAGGED] == pytest.approx(0.44)
@@ -111,5 +110,5 @@ def test_a_body_begins_at_rest_behind_its_filter() -> None:
     body = start_body(0.4, 1.0, 0.0, 0.5, copter)
     state, packed = np.empty(loop.STATE_SIZE), loop.packed(PARAMETERS)
     loop.start_hover(state, packed, 0.4, 1.0, 0.0, 0.5)
-    step(state, body, packed, copter, np.array([1.0, 0.0, 0.5]), np.array([0.5, 0.0, 0.0, 0.0]))
+    loop.step(state, body, packed, copter, np.array([1.0, 0.0, 0.5]), np.array([0.5, 0.0, 0.0, 0.0]))
     assert body[SENSED] == pytest.approx(0.5)

@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from app.autopilots.ardupilot.experiments import ardupilot_loop
-from app.autopilots.ardupilot.loop import ArduPilotLoop
+from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.vertical import packed
-from app.autopilots.px4.experiments import px4_loop
-from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.experiments import Px4Loop, px4_loop
 from app.autopilots.px4.replica.parameters import Parameters as Px4Parameters
 from app.autopilots.registry import experiment_of, space_of
 from app.core.definition import Definition, LogEvidence, Start

@@ -194,14 +194,14 @@ def require_hover_throttle(rig: LockstepRig, vehicle: MavlinkVehicle, order: Fli
 def test_the_copters_hold_by_a_position_target_then_step_and_report_their_reference(release: str) -> None:
     with copter(release) as rig:
         name, order = rig.autopilot, order_of(rig.autopilot)
-        learns = rig.drone.autopilot.held("MOT_HOVER_LEARN") if name == "ardupilot" else None
+        learns = rig.drone.autopilot.parameters["MOT_HOVER_LEARN"] if name == "ardupilot" else None
         vehicle = rig.vehicle()
         vehicle.stage(OWN_SAFE[name])
         record = vehicle.fly(order, on_sample=unwatched, should_stop=never)
         assert (record.ending, record.reason) == ("completed", "")
         assert rig.drone.body.stands
         if name == "ardupilot":
-            assert rig.drone.autopilot.held("MOT_HOVER_LEARN") == learns == 2.0
+            assert rig.drone.autopilot.parameters["MOT_HOVER_LEARN"] == learns == 2.0
         targets = [(at_s, -number(message, "z")) for at_s, message in rig.heard if message.get_type() == TARGET]
         commanded_s = next(at_s for at_s, message in reversed(rig.heard) if message.get_type() == "COMMAND_LONG")
         if name == "px4":
@@ -222,7 +222,7 @@ def test_the_copters_hold_by_a_position_target_then_step_and_report_their_refere
     changes_s = flight.time_s[1:][np.diff(flight["set_point_m"]) != 0.0]
     assert changes_s == pytest.approx([0.0, 15.0, 18.0], abs=0.05)
     own = {"ardupilot": "MOT_THST_HOVER", "px4": "MPC_THR_HOVER"}[name]
-    assert record.settings[own] == pytest.approx(rig.drone.autopilot.held(own))
+    assert record.settings[own] == pytest.approx(rig.drone.autopilot.parameters[own])
     percents = np.round(flight["throttle"] * 100.0) / 100.0
     assert np.abs(flight["throttle"] - percents).max() > 0.003, "it is not VFR_HUD's"
 

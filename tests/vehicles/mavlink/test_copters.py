@@ -72,9 +72,9 @@ def test_the_first_connection_reads_the_gains_and_writes_nothing(autopilot: str)
         assert "nothing was written" in vehicle.concern
         assert vehicle.condition().held[name] == pytest.approx(0.3)
         assert name not in rig.writes[3:]
-        assert rig.drone.autopilot.held(name) == 0.3
+        assert rig.drone.autopilot.parameters[name] == 0.3
         vehicle.release()  # a person's word: the named ones
-        assert rig.drone.autopilot.held(name) == SAFE[autopilot][name]
+        assert rig.drone.autopilot.parameters[name] == SAFE[autopilot][name]
         vehicle.close()
 
 
@@ -126,18 +126,18 @@ def test_heights_count_from_the_ground_though_the_altitude_begins_anew_at_arming
 @pytest.mark.complete
 def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
     with ready("px4") as rig, connected(rig) as vehicle:
-        assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+        assert rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == 2.5
         flown: list[float] = []
 
         def look() -> StopRequest | None:
             if rig.drone.body.altitude_m > 2.0:
-                flown.append(rig.drone.autopilot.held("MIS_TAKEOFF_ALT"))
+                flown.append(rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"])
             return StopRequest("seen enough") if len(flown) > 100 else None
 
         vehicle.stage(SAFE["px4"])
         vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)
         assert set(flown) == {3.0}
-        assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+        assert rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == 2.5
 
 
 KEPT_IN = "udp-127.0.0.1-4245-4244-px4-1-4741494e4c494e01.json"
@@ -151,7 +151,7 @@ def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) 
     with ready("px4") as rig, connected(rig, trial_parameters=tmp_path) as vehicle:
 
         def look() -> StopRequest | None:
-            if rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0:
+            if rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == 3.0:
                 kept.add(file.read_text())
             return StopRequest("seen enough") if rig.drone.body.altitude_m > 0.5 else None
 
@@ -174,7 +174,7 @@ def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = held
         with connected(rig, trial_parameters=tmp_path) as vehicle:
             assert vehicle.concern == ""
-            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == afterwards
+            assert rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == afterwards
             assert not file.exists()
 
 
@@ -188,7 +188,7 @@ def test_what_the_vehicle_does_not_tell_is_kept_until_it_does(tmp_path: Path) ->
             assert file.read_text() == KEPT
             rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
             vehicle.release()
-            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+            assert rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == 2.5
             assert not file.exists()
 
 
@@ -198,7 +198,7 @@ def test_what_was_set_on_another_vehicle_is_not_put_back_on_this_one(tmp_path: P
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         with connected(rig, trial_parameters=tmp_path):
-            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0
+            assert rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == 3.0
 
 
 def test_vehicles_of_one_type_that_have_one_address_by_turns_are_kept_apart(tmp_path: Path) -> None:
@@ -209,10 +209,10 @@ def test_vehicles_of_one_type_that_have_one_address_by_turns_are_kept_apart(tmp_
         autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         own, autopilot.uid = autopilot.uid, 7  # type: ignore[attr-defined]
         with connected(rig, trial_parameters=tmp_path):
-            assert (autopilot.held("MIS_TAKEOFF_ALT"), file.read_text()) == (3.0, KEPT)
+            assert (autopilot.parameters["MIS_TAKEOFF_ALT"], file.read_text()) == (3.0, KEPT)
         autopilot.uid = own  # type: ignore[attr-defined]
         with connected(rig, trial_parameters=tmp_path):
-            assert (autopilot.held("MIS_TAKEOFF_ALT"), file.exists()) == (2.5, False)
+            assert (autopilot.parameters["MIS_TAKEOFF_ALT"], file.exists()) == (2.5, False)
 
 
 @pytest.mark.parametrize(("simulated", "afterwards"), [(False, 2.5), (True, 3.0)])
@@ -227,7 +227,7 @@ def test_what_a_killed_process_had_set_is_put_back_under_another_address_where_t
         with connected(
             rig, trial_parameters=tmp_path, address="udp:127.0.0.1:14580@14550", simulated=simulated
         ) as vehicle:
-            assert (vehicle.concern, rig.drone.autopilot.held("MIS_TAKEOFF_ALT")) == ("", afterwards)
+            assert (vehicle.concern, rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"]) == ("", afterwards)
             assert file.exists() == simulated
 
 
@@ -239,7 +239,7 @@ def test_what_a_killed_process_had_set_is_put_back_before_anybody_has_decided_ab
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0
         first = partial(MavlinkVehicle, rig.options(), SAFE["px4"], is_real=False, observes=True, decided=False)
         with closing(first(clock=rig, transport=rig, trial_parameters=tmp_path)) as vehicle:
-            assert (vehicle.concern, rig.drone.autopilot.held("MIS_TAKEOFF_ALT")) == ("", 2.5)
+            assert (vehicle.concern, rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"]) == ("", 2.5)
             assert not file.exists()
 
 
@@ -278,7 +278,7 @@ def test_what_a_refused_run_had_set_is_put_back_too() -> None:
             with pytest.raises(VehicleError) as refusal:
                 vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
             assert refusal.value.not_flown
-            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+            assert rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] == 2.5
 
 
 @pytest.mark.parametrize(
@@ -466,13 +466,13 @@ def test_parameters_of_a_copter_outlive_its_reboot_and_paparazzis_do_not() -> No
         ("paparazzi", "gui_v_kp", False),
     ):
         with LockstepRig(autopilot) as rig:
-            before = rig.drone.autopilot.held(name)
+            before = rig.drone.autopilot.parameters[name]
             with rig.link(target_system=rig.drone.autopilot.system) as link:
                 to = {"target_system": rig.drone.autopilot.system, "target_component": 0}
                 link.send("PARAM_SET", **to, param_id=name, param_type=9, param_value=before + 1.0)
                 rig.wait_s(0.2)
             rig.drone.reboot()
-            assert rig.drone.autopilot.held(name) == before + (1.0 if kept else 0.0)
+            assert rig.drone.autopilot.parameters[name] == before + (1.0 if kept else 0.0)
 
 
 def test_a_vehicle_that_does_not_know_yet_where_it_is_is_waited_for_not_restarted() -> None:

@@ -101,7 +101,7 @@ def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_ha
     with Watching(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
         rig.watch(vehicle)
         record = fly(vehicle)
-        assert (record.ending, rig.drone.autopilot.held("aut_mod")) == ("aborted", HOME)
+        assert (record.ending, rig.drone.autopilot.parameters["aut_mod"]) == ("aborted", HOME)
         assert "It has not landed within 40 s." in record.reason
         assert "Land was still being repeated when this record ended." in record.reason
         assert ADVICE in vehicle.concern

@@ -8,7 +8,7 @@ the next.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,26 +22,18 @@ SHAPED: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
 _LONGEST_INTERVAL_S: Final = 0.5
 
 
-class Hover(NamedTuple):
-    """A start in flight: throttle demanded and filtered, altitude in m, climb rate in m/s and acceleration in m/s²."""
-
-    throttle: float
-    z_m: float
-    v_m_s: float
-    a_m_s2: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopTrace:
     """Recorded inputs and outputs of the loop, one row per step of `dt_s`.
 
     `time_s` has shape (n,), `inputs` (n, 6) in the order of `INPUTS`, `outputs` (n, 8) in that of `OUTPUTS`; n ≥ 1.
-    Without `hover` the run starts on the ground, as the throttle begins to rise.
+    `hover` is a start in flight: throttle demanded and filtered, altitude in m, climb rate in m/s and acceleration in
+    m/s²; without it the run starts on the ground, as the throttle begins to rise.
     """
 
     parameters: Parameters
     dt_s: float
-    hover: Hover | None
+    hover: tuple[float, float, float, float] | None
     time_s: Samples
     inputs: Samples
     outputs: Samples
@@ -97,15 +89,16 @@ def replica_of(log: LoopLog) -> dict[str, Samples]:
     """Signals as the replica computes them from the row itself, or for `SHAPED` from the row before, shape (n,) each;
     NaN where nothing can be computed."""
     return _shaped_again(log) | {
-        "v_t_m_s": _climb_rate_targets(log),
+        "v_t_m_s": climb_rate_targets(log.parameters, log.z_d_m - log.z_m, log.v_d_m_s),
         "throttle": log.hover + log.control_per_mille / 1000.0,
     }
 
 
-def _climb_rate_targets(log: LoopLog) -> Samples:
-    p, acceleration = log.parameters.position_p_1_s, log.parameters.acceleration_m_s2
-    rates = [square_root(error, p, acceleration, 0.0) for error in (log.z_d_m - log.z_m).tolist()]
-    return np.array(rates) + log.v_d_m_s
+def climb_rate_targets(parameters: Parameters, errors_m: Samples, v_d_m_s: Samples) -> Samples:
+    """Targets, shape (n,), that follow from the errors of the altitude and the desired climb rates, shape (n,) each."""
+    p, acceleration = parameters.position_p_1_s, parameters.acceleration_m_s2
+    rates = [square_root(error, p, acceleration, 0.0) for error in errors_m.tolist()]
+    return np.array(rates) + v_d_m_s
 
 
 def _shaped_again(log: LoopLog) -> dict[str, Samples]:

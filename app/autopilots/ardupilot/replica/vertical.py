@@ -1,5 +1,5 @@
 """ArduCopter's vertical loop (4.7, October 2025): shaped altitude target, position, velocity and acceleration
-controllers, throttle filter, and the takeoff before them.
+controllers, throttle filter, and the takeoff before them; and the copter under it, along a given reference.
 
 The loop runs at 400 Hz. Altitude, climb rate and acceleration are positive up, in m, m/s and m/s²; inside the velocity
 controller they are cm/s, inside the acceleration controller cm/s² and per mille of throttle, as the gains are. A step
@@ -23,9 +23,12 @@ from app.autopilots.ardupilot.replica.shaping import (
     square_root,
 )
 from app.core.kernels import kernel
+from app.core.models.copter import ALTITUDE, CLIMB_RATE, SENSED, advance
+from app.core.records.trajectory import Samples
 
 HOVER_MIN: Final = 0.125
 HOVER_MAX: Final = 0.6875
+THROTTLE_FILTER_HZ: Final = 2.0
 
 (
     POSITION_P, VELOCITY_P, VELOCITY_I, VELOCITY_D, VELOCITY_FF, VELOCITY_IMAX, VELOCITY_ERROR_GAIN,
@@ -60,7 +63,6 @@ OUTPUTS: Final = (
 )  # fmt: skip
 """The first elements of the state array."""
 
-_THROTTLE_FILTER_HZ: Final = 2.0
 _RELAXATION_S: Final = 0.16
 _RAMP_END: Final = 0.9
 _FILTERS: Final = (
@@ -72,7 +74,7 @@ _RAMP_END_CLIMB: Final = 0.1
 
 def packed(parameters: Parameters, dt_s: float = STEP_S) -> Packed:
     """Constants of a step of `dt_s`, shape (27,), for the kernels."""
-    p = [*parameters.values, dt_s, low_pass_gain(_THROTTLE_FILTER_HZ, dt_s), dt_s / (dt_s + _RELAXATION_S)]
+    p = [*parameters.values, dt_s, low_pass_gain(THROTTLE_FILTER_HZ, dt_s), dt_s / (dt_s + _RELAXATION_S)]
     for place in _FILTERS:
         p[place] = low_pass_gain(p[place], dt_s)
     p[JERK] = parameters.shaping_jerk_m_s3
@@ -296,3 +298,56 @@ def rollout(
             for place in range(STATE_SIZE):
                 state[place] = before[place]
             follow(state, p, recorded[row], z, v, a, lower, upper)
+
+
+@kernel
+def step(
+    state: State,
+    body: Samples,
+    p: Packed,
+    copter: Samples,
+    reference: Samples,
+    disturbance: Samples,
+) -> None:
+    """One step of loop and body. `reference` has shape (4,) as `REFERENCE`, of which the assumed hover throttle is not
+    used: it is a parameter of the loop. `disturbance` has shape (3,) as `DISTURBANCES`."""
+    state[Z_D], state[V_D], state[A_D] = reference[0], reference[1], reference[2]
+    filtered = state[THROTTLE_FILTERED]
+    filtered += p[THROTTLE_GAIN] * (state[THROTTLE] - filtered)
+    sensed = body[SENSED] + disturbance[2]
+    control(state, p, body[ALTITUDE], body[CLIMB_RATE], sensed, filtered <= 0.0, filtered >= 1.0)
+    advance(body, copter, p[DT], state[THROTTLE_FILTERED], disturbance[0], disturbance[1])
+
+
+@kernel
+def fly(
+    state: State,
+    body: Samples,
+    p: Packed,
+    copter: Samples,
+    references: Samples,
+    disturbances: Samples,
+    flown: Samples,
+) -> None:
+    """A step per row of `references`, shape (n, 4), and `disturbances`, (n, 3); fills `flown`, (n, 6) as `FLOWN`.
+
+    The loop gives the motors the 2 Hz low-pass of its throttle.
+    """
+    for row in range(len(references)):
+        flown[row, 0] = body[ALTITUDE]
+        flown[row, 1] = body[CLIMB_RATE]
+        flown[row, 2] = body[SENSED] + disturbances[row, 2]
+        step(state, body, p, copter, references[row], disturbances[row])
+        flown[row, 3] = state[THROTTLE]
+        flown[row, 4] = flown[row, 5] = state[THROTTLE_FILTERED]
+
+
+@kernel
+def shaped(p: Packed, altitude_m: float, targets: Samples, references: Samples) -> None:
+    """The reference on its way along `targets`, shape (n,), from rest at an altitude; fills the first three columns of
+    `references`, shape (n, 4) as `REFERENCE`: the desired motion at each step. The throttle is never at a limit."""
+    state = np.empty(STATE_SIZE)
+    start_hover(state, p, 0.0, altitude_m, 0.0, 0.0)
+    for row in range(len(targets)):
+        shape(state, p, targets[row])
+        references[row, 0], references[row, 1], references[row, 2] = state[Z_D], state[V_D], state[A_D]

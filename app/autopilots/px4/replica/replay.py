@@ -126,8 +126,7 @@ class LoopLog:
     @property
     def flying(self) -> NDArray[np.bool_]:
         """Rows in which all set-points count, shape (m,)."""
-        flying: NDArray[np.bool_] = (self.takeoff == loop.FLIGHT) & ~self.ground_contact
-        return flying
+        return np.asarray((self.takeoff == loop.FLIGHT) & ~self.ground_contact)
 
 
 def replica_of(log: LoopLog) -> dict[str, Samples]:

@@ -9,7 +9,6 @@ from app.autopilots.simulated.body import ACCEPTED, FAILED, TICK_S, Body
 from app.autopilots.simulated.copter import Copter, copter_kind
 from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
 from app.autopilots.simulated.copter_parameters import (
-    BY_VALUE,
     Behaviour,
     FirmwareProfile,
     FlightMode,
@@ -76,7 +75,6 @@ class Toy(Copter):
         autopilot=16,
         version=0x010000FF,
         parameters=(real("TOY_P", 0.1), real("TOY_I", 0.02), real("TOY_D", 0.2)),
-        coding=BY_VALUE,
         periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
         streams=(),
         modes=(

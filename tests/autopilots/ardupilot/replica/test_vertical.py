@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.ardupilot.loop_check import read_ardupilot_trace
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
 from app.autopilots.ardupilot.replica.vertical import (
@@ -38,7 +39,6 @@ from app.autopilots.ardupilot.replica.vertical import (
 from app.autopilots.ardupilot.replica.vertical import (
     packed as constants_of,
 )
-from app.autopilots.ardupilot.trace import read_ardupilot_trace
 
 TRACES = sorted((Path(__file__).parents[3] / "data" / "ardupilot_loop").glob("*.csv.gz"))
 TOLERANCES = np.array([1e-5, 2e-6, 1.2e-5, 4e-5, 1e-4, 0.01, 5e-5, 2e-5])
@@ -108,7 +108,7 @@ def largest_differences_beside(trace: LoopTrace, *, follow: bool) -> np.ndarray[
     if trace.hover is None:
         start_takeoff(state, packed, 0.0)
     else:
-        start_hover(state, packed, trace.hover.throttle, trace.hover.z_m, trace.hover.v_m_s, trace.hover.a_m_s2)
+        start_hover(state, packed, *trace.hover)
     computed, followed = np.empty_like(trace.outputs), np.full(len(trace.time_s), follow)
     rollout(state, packed, trace.inputs, trace.outputs, followed, computed)
     return np.asarray(np.abs(computed - trace.outputs).max(axis=0))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.autopilots.px4.loop import Px4Loop
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.replica.parameters import STEP_S, Parameters
 from app.core.analysis.loop import Run
 from app.core.models.copter import DISTURBANCES, FLOWN, GRAVITY_M_S2, REFERENCE, Copter
