@@ -17,7 +17,7 @@ from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.autopilots.ardupilot.replica import parameters as ardupilot_parameters
 from app.autopilots.ardupilot.replica.copter import shaped
 from app.autopilots.ardupilot.replica.vertical import packed
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.recorded_flight import Steps, require_channels, segment_of, unanswered, whole_steps
 from app.core.analysis.segment import LEAD_S
 from app.core.control.parameter_checks import PLAUSIBLE, require_within

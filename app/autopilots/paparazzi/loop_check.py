@@ -34,7 +34,7 @@ from app.autopilots.paparazzi.trace import may_be_loop_trace, read_loop_trace_st
 from app.core.control.vertical_guidance import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
-from app.core.records.overlaid import Overlay
+from app.core.records.trajectory import Overlay
 from app.logs.base import refused
 from app.logs.formats import Format
 

@@ -1,8 +1,8 @@
 """What an analysis asks of an autopilot's altitude loop: its gains and their limits, a flight with other gains, its
-linear model in hover, and its words."""
+linear model in hover, and its words; and a flight as a log holds it, with the loop that flew it."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
@@ -157,10 +157,6 @@ class AltitudeLoop(LinearLoop[Copter], Protocol):
         """How far a logged climb rate target may be from `climb_rate_targets`."""
 
     @property
-    def row_s(self) -> float | None:
-        """Time before a row over which its acceleration is a mean; None if it was sensed."""
-
-    @property
     def accelerometer(self) -> Filter:
         """The filter between the vehicle's acceleration and that in the log."""
 
@@ -218,3 +214,35 @@ def transition_of(after_step: Callable[[Samples], Samples], loop_size: int, nudg
     """
     nudges = nudge * np.eye(loop_size + BODY_SIZE)
     return np.column_stack([(after_step(each) - after_step(-each)) / (2.0 * nudge) for each in nudges])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoggedFlight:
+    """Segments of one flight with the same parameters, and the loop with these.
+
+    `activity` is the standard deviation of the demanded throttle about its own 2 Hz low-pass, share of full, if it was
+    recorded: the noise of an accelerometer that is not in the log follows from it. `assumed` names parameters that the
+    record lacks, so that the loop has the firmware's defaults.
+    """
+
+    loop: AltitudeLoop
+    segments: Sequence[Segment]
+    activity: float | None = None
+    assumed: Sequence[str] = ()
+
+    @property
+    def error_m(self) -> float:
+        """Mean distance between reference and altitude, over the scored rows of all segments."""
+        return float(np.mean(np.concatenate([np.abs(each.z_d_m - each.z_m)[each.scored] for each in self.segments])))
+
+    def with_hover(self, hover_throttle: float) -> Self:
+        """The flight under a loop with another value of its parameter for the throttle in hover, which it keeps."""
+        segments = [
+            replace(each, assumed_hover=np.full_like(each.assumed_hover, hover_throttle)) for each in self.segments
+        ]
+        return replace(self, loop=self.loop.with_hover(hover_throttle), segments=segments)
+
+    @property
+    def throttle_mean(self) -> float:
+        """Mean throttle of all segments."""
+        return float(np.mean(np.concatenate([each.throttle_filtered for each in self.segments])))

@@ -9,7 +9,7 @@ from app.autopilots.ardupilot.loop import ArduPilotLoop
 from app.autopilots.ardupilot.replica import vertical as loop
 from app.autopilots.ardupilot.replica.copter import fly
 from app.autopilots.ardupilot.replica.parameters import Parameters
-from app.core.analysis.margin import (
+from app.core.analysis.proposal import (
     EXTRA_LAG_S,
     LARGEST_MARGIN,
     REQUIRED_MARGIN,
