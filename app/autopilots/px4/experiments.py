@@ -10,8 +10,7 @@ import numpy as np
 
 from app.autopilots.px4.loop import Px4Loop
 from app.autopilots.px4.replica import parameters as px4_parameters
-from app.core.analysis.hover import found_hover
-from app.core.analysis.loop import LoggedFlight
+from app.core.analysis.loop import LoggedFlight, found_hover
 from app.core.analysis.recorded_flight import Steps, require_channels, segment_of, whole_steps
 from app.core.analysis.segment import LEAD_S
 from app.core.control.parameter_checks import PLAUSIBLE, require_within

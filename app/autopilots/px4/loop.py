@@ -20,8 +20,7 @@ from app.autopilots.px4.replica.parameters import (
     low_pass_gain,
     step_parameters,
 )
-from app.core.analysis.hover import found_hover
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, mean_over, transition_of
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, found_hover, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps, interpolated
 from app.core.models.copter import (
     DISTURBANCES,

@@ -232,15 +232,13 @@ class CopterModel(LimitedModel[Copter]):
         )
 
     def notes(self, gains: Vector) -> tuple[str, ...]:
+        """The hover throttle to set, the limits, and what the likeliest vehicle would fly with the sets that are set
+        without a model. Those are as good that are not above the interval of `gains`: no flight would tell them
+        apart."""
         hover = () if self._hover is None else (self._hover.reason,)
-        return (*hover, *self.limits(gains), self._rules_note(gains))
-
-    def _rules_note(self, gains: Vector) -> str:
-        """What the likeliest vehicle would fly with the sets that are set without a model. Those are as good that are
-        not above the interval of `gains`: no flight would tell them apart."""
         as_good_m = _interval(self._all.predict(self.loop(gains))).upper
         found = [self._rule_note(*rule, as_good_m=as_good_m) for rule in self._rules]
-        return f"For comparison, the model predicts {'; '.join(found)}."
+        return (*hover, *self.limits(gains), f"For comparison, the model predicts {'; '.join(found)}.")
 
     def _rule_note(self, name: str, error_m: float, margin: float, *, as_good_m: float) -> str:
         remark = ", which is predicted as good" if error_m <= as_good_m else ""

@@ -4,7 +4,7 @@ action that is recommended to the operator, and the prediction of a flight with 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Literal
 
 from app.core.definition import Definition, Flight, LogEvidence, aborted_by_gains
 from app.core.experiments.base import Experiment, ModelledExperiment
@@ -21,7 +21,7 @@ from app.core.tuning.confirmation import (
     standing_within_bounds,
 )
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
-from app.core.tuning.gate import GateResult, check_policy
+from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
 from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict
 from app.core.tuning.strategies import STRATEGIES
@@ -147,17 +147,13 @@ def _confirmed(evidence: Evidence[Experiment], proposal: Proposal) -> Proposal:
     group = now.winner if wanted.phase == "repeat" else now.baseline
     gate = check_policy(definition, experiment, evidence.space, group.gains, flights, spread=spread)
     if not gate.passed:
-        return again(now.winner, "none", Explanation(summary=_refused(group, gate)))
+        refused = (
+            f"The best gains cannot be confirmed: {format_gains(group.gains)} cannot be flown again, because the gate "
+            f"refuses them: {' '.join(check.sentence for check in gate.refusals)}"
+        )
+        return again(now.winner, "none", Explanation(summary=refused))
     lesson = "Whether the best gains are better than the first."
     return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
-
-
-def _refused(group: Group, gate: GateResult) -> str:
-    reasons = " ".join(check.sentence for check in gate.refusals)
-    return (
-        f"The best gains cannot be confirmed: {format_gains(group.gains)} cannot be flown again, because the gate "
-        f"refuses them: {reasons}"
-    )
 
 
 def _with_notes(proposal: Proposal, evidence: Evidence[ModelledExperiment], taken: str) -> Proposal:
@@ -175,7 +171,6 @@ def _with_notes(proposal: Proposal, evidence: Evidence[ModelledExperiment], take
 AdviceKind = Literal["step", "repeat", "baseline", "stop"]
 
 _OTHER_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
-_REPEAT_SHOWS: Final = "Flying the best gains again shows whether their error stays the same."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,7 +209,8 @@ def advise(
     if now is not None and proposal.kind == "none" and tells_noise:
         budget = definition.stop.max_flights
         ended = f"{NO_STEP} the budget of {count(budget, 'flight')} is used up. " if len(flights) >= budget else ""
-        why = f"{proposal.explanation.summary} {ended}{_REPEAT_SHOWS}"
+        shows = "Flying the best gains again shows whether their error stays the same."
+        why = f"{proposal.explanation.summary} {ended}{shows}"
         return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
     if now is None or tells_noise or not (proposal.kind == "none" or is_reopened):
         is_refuted = proposal.kind == "start" and bool(aborted_by_gains(flights, proposal.gains))
