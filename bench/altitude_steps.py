@@ -20,16 +20,15 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.registry import experiment_of
-from app.core.analysis.margin import RINGING_DAMPING
-from app.core.analysis.proposal import LARGEST_ACTIVITY
+from app.core.analysis.proposal import LARGEST_ACTIVITY, RINGING_DAMPING
 from app.core.definition import Definition, Flight
 from app.core.errors import TrajectoryError
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import halton
 from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Trajectory
+from app.core.tuning.campaign_models import minimise_in_box
 from app.core.tuning.proposals import next_proposal
-from app.core.tuning.trust_region import minimise_in_box
 from app.vehicles.base import RECORDED_BEYOND_S
 from app.vehicles.jsbsim import JsbsimFlight
 from app.vehicles.registry import check_options

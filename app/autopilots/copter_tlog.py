@@ -17,7 +17,7 @@ from app.autopilots.px4.experiments import px4_loop, read_px4
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording, Rows, held
 from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, Part, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
 from app.core.analysis.segment import LEAD_S
 from app.core.errors import Problem, TrajectoryError

@@ -9,8 +9,7 @@ from typing import BinaryIO, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.records.overlaid import Overlaid, Overlay
-from app.core.records.trajectory import Samples, select_samples
+from app.core.records.trajectory import Overlaid, Overlay, Samples, select_samples
 from app.logs.formats import Format
 
 Kind = Literal["log", "trace"]

@@ -17,7 +17,7 @@ from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
 from app.autopilots.tlog import HINT as TLOG_HINT
 from app.autopilots.tlog import read_tlog
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.logs.base import refused
 from app.logs.formats import Format, head_of, recognise

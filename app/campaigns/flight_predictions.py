@@ -19,8 +19,8 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory, select_samples
-from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.predictions import is_informative
+from app.core.tuning.proposals import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database

@@ -8,7 +8,8 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
 from app.common.schemas import Schema
-from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
+from app.core.experiments.base import Fitted
+from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.theme import ThemeName

@@ -69,6 +69,18 @@ class Gain:
 
 
 @dataclass(frozen=True, slots=True)
+class Box:
+    """Lowest and highest allowed gains, both of shape (n,)."""
+
+    low: Vector
+    high: Vector
+
+    def nearest(self, gains: Vector) -> Vector:
+        """The closest integer counts in the box."""
+        return np.clip(np.rint(gains), self.low, self.high)
+
+
+@dataclass(frozen=True, slots=True)
 class PolicySpace:
     """The gains of an experiment in a fixed order, with their bounds."""
 

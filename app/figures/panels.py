@@ -8,7 +8,7 @@ from typing import ClassVar, Final, Literal
 
 import numpy as np
 
-from app.core.records.overlaid import Overlaid
+from app.core.records.trajectory import Overlaid
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
+from app.core.experiments.base import Fitted
 from app.core.formatting import count
-from app.core.statistics.drift import MONITORED_PARAMETERS, Fitted
+from app.core.statistics.drift import MONITORED_PARAMETERS
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, literal, ready, scatter
 

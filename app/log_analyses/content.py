@@ -7,7 +7,7 @@ from typing import Final
 from app.autopilots.readers import reader_of
 from app.autopilots.takeoffs import Takeoff
 from app.core.analysis.analysis import analyze
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot

@@ -5,8 +5,7 @@ from pathlib import PurePath
 from typing import Final
 
 from app.core.analysis.analysis import Analysis, Assessment
-from app.core.analysis.margin import EXTRA_LAG_S, LARGEST_MARGIN, REQUIRED_MARGIN
-from app.core.analysis.proposal import LARGEST_ACTIVITY
+from app.core.analysis.proposal import EXTRA_LAG_S, LARGEST_ACTIVITY, LARGEST_MARGIN, REQUIRED_MARGIN
 from app.core.formatting import format_gains, percent
 from app.core.records.trajectory import Samples
 from app.figures.panels import Line, Panel, Plot

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from app.autopilots.px4.experiments import SLOW_HZ, Px4Loop
 from app.autopilots.px4.replica import vertical as loop
 from app.autopilots.px4.replica.parameters import STEP_S, Parameters, low_pass_gain
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.kernels import kernel
 from app.core.models.copter import filtered

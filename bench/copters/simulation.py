@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.replica import vertical as loop
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.kernels import kernel
 from app.core.models.copter import GRAVITY_M_S2, Copter, accelerometer_filter

@@ -23,10 +23,10 @@ from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.corrected_model import start_gains
 from app.core.tuning.definition_checks import check_definition
-from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies import STRATEGIES, gradient
+from app.core.tuning.strategy import Evidence
 from bench.predictions import prediction_of
 from bench.targets.flying import EXPERIMENT, SPACE, Method, Tuning
 

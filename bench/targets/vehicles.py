@@ -14,7 +14,7 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.models.vertical import GRAVITY_M_S2
 from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
-from app.core.tuning.trust_region import minimise_in_box
+from app.core.tuning.campaign_models import minimise_in_box
 from app.vehicles.base import OptionValue
 from app.vehicles.jsbsim import FULL_THRUST_N, JsbsimFlight
 from app.vehicles.kernels import ALTITUDE, Rows

@@ -9,7 +9,7 @@ import pytest
 
 from app.autopilots.readers import reader_of
 from app.core.analysis.analysis import analyze, is_alike
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError

@@ -12,7 +12,7 @@ from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.replica.parameters import Parameters
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, TrajectoryError
 from app.core.records.trajectory import Samples
 from tests.core.analysis.flights import GUSTY, simulated_flight

@@ -11,7 +11,7 @@ from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.copter_tlog import copter_steps
 from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.tlog import read_tlog
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS

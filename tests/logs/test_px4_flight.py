@@ -15,7 +15,7 @@ from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.replica.parameters import Parameters
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.errors import InputError, TrajectoryError
 from tests.core.analysis.px4_flights import simulated_px4

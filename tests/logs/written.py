@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.records.trajectory import Samples
 from tests.logs.recorded import OnBoardLog

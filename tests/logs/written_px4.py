@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final
 
 from app.autopilots.px4.replica.vertical import GRAVITY
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from tests.logs.recorded import ULogFile
 
 HOLD, MISSION, TAKEOFF, LAND, OFFBOARD, POSITION = 4, 3, 17, 18, 14, 2

@@ -32,8 +32,7 @@ from app.autopilots.ardupilot.replica.parameters import (
 from app.autopilots.ardupilot.replica.replay import climb_rate_targets
 from app.autopilots.copter_loop import CopterLoop
 from app.core.analysis import recorded_flight
-from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, mean_over, transition_of
+from app.core.analysis.loop import GainSpace, LoggedFlight, LoopTexts, Run, mean_over, transition_of
 from app.core.analysis.segment import LEAD_S, Segment, Steps
 from app.core.control.parameter_checks import PLAUSIBLE, require_within
 from app.core.experiments.base import Experiment, Scatter

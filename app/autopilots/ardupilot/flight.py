@@ -26,7 +26,7 @@ from app.autopilots.segments import (
     jumps,
     thinned,
 )
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.records.trajectory import Samples
 

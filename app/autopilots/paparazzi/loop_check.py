@@ -48,7 +48,7 @@ from app.core.control.vertical_guidance import (
 )
 from app.core.errors import InputError, Problem
 from app.core.formatting import format_gains
-from app.core.records.overlaid import Overlay
+from app.core.records.trajectory import Overlay
 from app.logs.base import refused
 from app.logs.formats import Format
 from app.logs.trace_table import GZIP, TraceChecks, is_zipped, read_rows, text_of

@@ -39,7 +39,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, count, format_gains
 from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
-from app.core.records.step_response import StepResponse, step_response
+from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import landing_battery_v
 from app.db import trajectories

@@ -17,8 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.loop import AltitudeLoop
+from app.core.analysis.loop import AltitudeLoop, LoggedFlight
 from app.core.analysis.segment import Segment, interpolated
 from app.core.models.copter import GRAVITY_M_S2, Copter, filtered, motor_filter
 from app.core.records.trajectory import Samples

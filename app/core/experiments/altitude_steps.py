@@ -1,16 +1,18 @@
-"""Steps of the altitude set point in flight, under Paparazzi's vertical loop."""
+"""Steps of the altitude set point in flight, under Paparazzi's vertical loop, which a margin takes as linear about
+hover, on the model of `app.core.models.vertical`."""
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final, Self
 
 import numpy as np
 
-from app.core.analysis.linear_guidance import LinearGuidance
-from app.core.control.vertical_guidance import POSITION_BITS, RATE_HZ, STEP_S
+from app.core.analysis.loop import MarginTexts
+from app.core.control.vertical_guidance import FULL_THRUST, POSITION_BITS, RATE_HZ, STEP_S
 from app.core.definition import OptionValue
 from app.core.experiments.base import Check, Envelope, Matrix, ModelParameter, ParameterDistribution, Scatter
-from app.core.experiments.copter_steps_hazards import COPTERS, check_margin
+from app.core.experiments.copter_steps import COPTERS, check_margin
 from app.core.experiments.step_sequence import REFERENCE, StepSequence, step_options
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
 from app.core.models.copter import filtered, motor_filter
@@ -18,15 +20,60 @@ from app.core.models.vertical import (
     ALTITUDE,
     CHANNELS,
     COLUMNS,
+    DRAG_1_S,
     ENTERED,
+    GRAVITY_M_S2,
+    HOVER_THROTTLE,
+    MEASUREMENT_DELAY_S,
+    MOTOR_LAG_S,
+    QUADRATIC_SHARE,
     START_LATENCY_S,
     commanded,
     fly_recorded,
+    force_at_hover,
     observe,
 )
 from app.core.models.vertical_batch import reference_altitude
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples, Trajectory
+
+_COUNTS: Final = np.array([2.0, 2.0, 8.0])
+"""Thrust counts per m of altitude error, per m·s of its integral, and per m/s of the climb rate error, for gains kp,
+ki, kd of 1: what the fractional bits and the shifts of the loop leave."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearGuidance:
+    """A `LinearLoop` with the gains kp, ki, kd, in counts, shape (3,); vehicles are model vectors, shape (8,)."""
+
+    gains: Vector
+
+    texts = MarginTexts(fast_gains="gains", lateness="delay")
+    step_s = STEP_S
+
+    def with_fast_gains(self, factor: float) -> Self:
+        """All feedback passes through all three gains."""
+        return type(self)(factor * self.gains)
+
+    def transition(self, model: Vector, /, *, late_s: float = 0.0) -> Samples:
+        """Of integral, altitude, climb rate, thrust, and dead time by its second-order Padé approximation, in which the
+        loop's own step is included."""
+        from scipy.linalg import expm
+
+        hover, share, lag_s = model[HOVER_THROTTLE], model[QUADRATIC_SHARE], max(model[MOTOR_LAG_S], STEP_S)
+        lift_m_s2 = GRAVITY_M_S2 * (1.0 - share + 2.0 * share * hover) / force_at_hover(hover, share)
+        dead_s = model[MEASUREMENT_DELAY_S] + late_s + STEP_S
+        proportional, integral, damping = -self.gains * _COUNTS / FULL_THRUST
+        command = np.array([integral, proportional, damping, 0.0, 0.0, 0.0])
+        rates = np.zeros((6, 6))
+        rates[0, 1] = rates[1, 2] = rates[4, 5] = 1.0
+        rates[2, [2, 3]] = -model[DRAG_1_S], lift_m_s2
+        rates[3] = command / lag_s
+        rates[3, [3, 5]] = -1.0 / lag_s, -12.0 / dead_s / lag_s
+        rates[5] = command
+        rates[5, [4, 5]] = -12.0 / dead_s**2, -6.0 / dead_s
+        return np.asarray(expm(rates * STEP_S))
+
 
 CLIMB_S: Final = 10.0
 """Time from the command to the first step: the reference needs 4 s for the climb."""

@@ -156,14 +156,20 @@ class ModelParameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FittedParameter:
-    """A fitted parameter with its standard error; `nominal` and `prior_sd` are its prior."""
+class Fitted:
+    """A fitted parameter of the model with its standard error, in its unit."""
 
     name: str
     title: str
     unit: str
     value: float
     standard_error: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedParameter(Fitted):
+    """A fitted parameter with its standard error; `nominal` and `prior_sd` are its prior."""
+
     nominal: float
     prior_sd: float
 

@@ -1,4 +1,5 @@
-"""What altitude steps under ArduCopter and PX4 share: the sequence, its score, and the model of the vehicle.
+"""What altitude steps under ArduCopter and PX4 share: the sequence, its score, the model of the vehicle, and what the
+gate checks on a few copters that the flights allow.
 
 The model is the copter of `app.core.models.copter` under the replica of the autopilot's loop. It starts in hover at the
 first height, `LEAD_S` before the first step; until then it is where its reference is. Gains beside those in the
@@ -7,14 +8,13 @@ experiment's space, filters and limits are the autopilot's parameters (`under`),
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
-from typing import ClassVar, Final, Self
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final, Self, TypeVar
 
 import numpy as np
 
-from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.hover import HoverAdvice, advise_hover, found_hover
-from app.core.analysis.loop import AltitudeLoop, Run
+from app.core.analysis.loop import AltitudeLoop, HoverAdvice, LinearLoop, LoggedFlight, Run, advise_hover, found_hover
+from app.core.analysis.proposal import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.analysis.recorded_flight import Steps
 from app.core.definition import OptionValue
 from app.core.errors import InputError, Problem
@@ -27,14 +27,8 @@ from app.core.experiments.base import (
     ParameterDistribution,
     SimplexSearch,
 )
-from app.core.experiments.copter_steps_hazards import (
-    COPTERS,
-    check_altitudes,
-    check_hover,
-    check_margin,
-    refuse_parameters,
-)
 from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, step_options
+from app.core.formatting import number
 from app.core.models.copter import DISTURBANCES, FLOWN, Copter
 from app.core.models.set_points import SetPoints
 from app.core.policy import Vector
@@ -46,6 +40,13 @@ in a takeoff, and both then settle."""
 LARGEST_STEP_M: Final = 2.0
 GRID_HZ: Final = 50.0
 """Rate of a model run's output."""
+
+COPTERS: Final = 5
+"""Vehicles of a distribution that are checked, and for which gains are searched."""
+_KNOWN_TO: Final = 0.03
+"""Standard deviation of a hover throttle that flights have shown; the data sheet's is larger."""
+
+_V = TypeVar("_V")
 
 _SEQUENCE: Final = StepSequence(climb_s=CLIMB_S)
 _SHOWN: Final = {ALTITUDE: "z_m", "climb_rate_m_s": "v_m_s", "throttle": "throttle"}
@@ -213,7 +214,17 @@ class CopterSteps(ModelledExperiment):
         simulated with parameters with which the replica does not hold. A known hover throttle that the autopilot's
         parameter does not suit is told."""
         if self._unfit:
-            return refuse_parameters(self._unfit)
+            return tuple(
+                Check(
+                    "parameters",
+                    False,
+                    f"The vehicle's {each.field} {each.reason}; otherwise the model of its loop does not hold. Set it "
+                    "on the vehicle, and mark the flights with the other value invalid.",
+                    worst=math.inf,
+                    limit=0.0,
+                )
+                for each in self._unfit
+            )
         models = spread.sample(self, COPTERS)
         altitudes = self.outputs(np.tile(gains, (COPTERS, 1)), models)
         return (
@@ -248,3 +259,54 @@ class CopterSteps(ModelledExperiment):
         step_s = self.loop(self.space.default).step_s
         steps_s = np.arange(0.0, grid_s[-1] + step_s, step_s)
         return np.interp(grid_s, steps_s, self.references(steps_s)[:, 0])
+
+
+def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) -> tuple[Check, Check]:
+    """Highest and lowest altitude of simulated flights, shape (k, n): below the ceiling, and above half of the lowest
+    set point."""
+    highest_m, lowest_m = float(altitudes.max()), float(altitudes.min())
+    floor_m = 0.5 * min(set_points.altitudes_m)
+    rises = "rises to" if highest_m <= ceiling_m else "would rise to"
+    falls = "falls to" if lowest_m >= floor_m else "would fall to"
+    return (
+        Check(
+            "altitude",
+            highest_m <= ceiling_m,
+            f"The highest of {len(altitudes)} simulated flights {rises} {highest_m:.2f} m; {ceiling_m:g} m is allowed.",
+            worst=highest_m,
+            limit=ceiling_m,
+        ),
+        Check(
+            "lowest altitude",
+            lowest_m >= floor_m,
+            f"The lowest of {len(altitudes)} simulated flights {falls} {number(lowest_m, 2)} m; "
+            f"{floor_m:g} m is allowed.",
+            worst=lowest_m,
+            limit=floor_m,
+        ),
+    )
+
+
+def check_hover(advice: HoverAdvice | None, hover_throttle: float, deviation: float) -> tuple[Check, ...]:
+    """A check that passes, and says that the vehicle hovers outside what its autopilot finds in flight; none if it does
+    not, or while flights have not shown the hover throttle. No refusal: only another flight can show that the parameter
+    was set."""
+    if advice is None or not advice.is_outside or deviation > _KNOWN_TO:
+        return ()
+    sentence = f"{advice.reason} Do this before the flight."
+    return (Check("hover throttle", True, sentence, worst=hover_throttle, limit=advice.found),)
+
+
+def check_margin(loop: LinearLoop[_V], vehicles: Sequence[_V]) -> Check:
+    """Whether the loop rings with none of the vehicles (`robust_damping`), of which the first is the likeliest."""
+    damping = robust_damping(loop, vehicles)
+    passed = damping >= RINGING_DAMPING
+    return Check(
+        "margin",
+        passed,
+        f"With up to {REQUIRED_MARGIN:g} times the {loop.texts.fast_gains}, and {1e3 * EXTRA_LAG_S:.0f} ms more "
+        f"{loop.texts.lateness} for the likeliest vehicle, the least damped of {len(vehicles)} likely vehicles has a "
+        f"damping ratio of {damping:.2f}; {'at least ' if passed else ''}{RINGING_DAMPING:g} is needed.",
+        worst=damping,
+        limit=RINGING_DAMPING,
+    )

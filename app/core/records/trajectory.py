@@ -1,4 +1,4 @@
-"""Trajectories: the samples of a flight or a model run, and their reduction for plotting.
+"""Trajectories: the samples of a flight or a model run, and their reduction for plotting; signals beside a replica's.
 
 Records keep their peaks and shape (MinMaxLTTB, Van Der Donckt et al., 2023); smooth curves keep the samples at which
 they bend (Ramer, 1972; Douglas and Peucker, 1973).
@@ -118,3 +118,36 @@ def select_bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
             needed.add(furthest)
             spans += [(first, furthest), (furthest, last)]
     return np.array(sorted(needed), dtype=np.uint64)
+
+
+Curve = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Overlay:
+    """Recorded and replicated signals of the same samples.
+
+    `time_s` has shape (n,); `recorded` and `replica` hold each signal by name, shape (n,). `differs` marks the samples
+    without an explanation.
+    """
+
+    time_s: Samples
+    recorded: Mapping[str, Samples | NDArray[np.int64]]
+    replica: Mapping[str, Samples | NDArray[np.int64]]
+    differs: Mapping[str, NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Overlaid:
+    """One signal over time, recorded and from the replica, of equal length.
+
+    `differing_s` and `differing` are time and value of each mark where the recorded signal differs.
+    """
+
+    label: str
+    digits: int
+    time_s: Curve
+    recorded: Curve
+    replica: Curve
+    differing_s: Curve = ()
+    differing: Curve = ()

@@ -14,6 +14,8 @@ from math import floor, hypot, log10
 from types import MappingProxyType
 from typing import Final
 
+from app.core.experiments.base import Fitted
+
 FALSE_ALARMS: Final = 0.05
 MONITORED_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -24,17 +26,6 @@ MONITORED_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """Parameters that show wear, and where to look for its cause."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fitted:
-    """A fitted parameter of the model with its standard error, in its unit."""
-
-    name: str
-    title: str
-    unit: str
-    value: float
-    standard_error: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -83,11 +83,6 @@ def correct_by_bias(experiment: ModelledExperiment, flight: Flight) -> Corrected
     return CorrectedModel(experiment, experiment.nominal_model, resample_to_grid(then, flight) - flown)
 
 
-def start_model(experiment: ModelledExperiment, donor: Flight | None) -> CorrectedModel:
-    """The model before the first valid flight: the nominal one, or the one corrected by another vehicle's flight."""
-    return uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
-
-
 def correct_in_loop(experiment: ModelledExperiment, flight: Flight) -> DisturbedModel | None:
     """The nominal model with the flight's disturbances inside the loop, from the trajectory as stored.
 

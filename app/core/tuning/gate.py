@@ -14,7 +14,7 @@ from app.core.formatting import percent
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.tuning.campaign_models import as_flown, known_distribution
 from app.core.tuning.corrected_model import start_gains
-from app.core.tuning.evidence import Evidence
+from app.core.tuning.strategy import Evidence
 
 
 def envelope_of(definition: Definition, experiment: Experiment) -> Envelope:
@@ -29,15 +29,6 @@ _LEAST_CHANGE: Final = 0.0005
 
 NUMBERS: Final = "numbers"
 """Name of the check that cannot be overruled."""
-
-
-def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
-    """Return a refusal for each gain that is not finite, or not a 32-bit integer where the controller needs one."""
-    return tuple(
-        _refusal(NUMBERS, gain, gains, reason)
-        for gain in space.gains
-        if (reason := gain.refusal_by_controller(gains[gain.name])) is not None
-    )
 
 
 def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
@@ -144,7 +135,12 @@ def check_policy(
     `start` gives the start gains if they are known, because the search on the model is slow. `spread` gives the
     vehicle's parameter distribution, for `flights` without their records.
     """
-    if numbers := check_numbers(space, gains):
+    numbers = tuple(
+        _refusal(NUMBERS, gain, gains, reason)
+        for gain in space.gains
+        if (reason := gain.refusal_by_controller(gains[gain.name])) is not None
+    )
+    if numbers:
         return GateResult(numbers)
     valid, modelled = [flight for flight in flights if flight.outcome == "valid"], experiment.modelled
     hazards: tuple[Check, ...] = ()

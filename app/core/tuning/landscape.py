@@ -21,7 +21,7 @@ import numpy as np
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment, Matrix
 from app.core.policy import Gain, Gains, PolicySpace, Vector
-from app.core.tuning.flight_predictor import model_of
+from app.core.tuning.proposals import model_of
 from app.core.tuning.transfer import informed_evidence
 
 ErrorsOf = Callable[[Matrix], Vector]

@@ -17,7 +17,7 @@ from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.formatting import format_gains, interval_text, short
 from app.core.policy import Gains
-from app.core.records.step_response import StepResponse, step_response
+from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.gate import check_policy

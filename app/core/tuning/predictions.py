@@ -28,13 +28,13 @@ from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, no
 from app.core.formatting import count
 from app.core.models.vertical import ENTERED
 from app.core.policy import Vector
-from app.core.records.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Trajectory
 from app.core.statistics.comparisons import Group, PooledScatter
 from app.core.tuning.calibration import Calibration
 from app.core.tuning.corrected_model import resample_to_grid
-from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import (
     CONFIDENCE,
+    Evidence,
     Explanation,
     Interval,
     Kind,
@@ -263,7 +263,7 @@ class FlightPrediction(ModelPrediction):
 def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> FlightPrediction:
     """Predict a flight with `gains`, shape (n,); `base` is the best of the calibrated flights."""
     experiment = calibration.experiment
-    bias = remaining_bias(calibration, base, gains)
+    bias = remaining_biases(calibration, base, gains[np.newaxis])[0]
     models = calibration.plausible(runs=MODELS, next_flight=True)
     clean = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
     outputs = clean + bias
@@ -298,13 +298,8 @@ def predict_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vec
     return errors
 
 
-def remaining_bias(calibration: Calibration, base: Flight, gains: Vector) -> Samples:
-    """Expected deviation of a flight with `gains`, shape (n,), from the calibrated model, on the grid."""
-    return np.asarray(remaining_biases(calibration, base, gains[np.newaxis])[0])
-
-
 def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> Matrix:
-    """The same for many gain sets: (c, n) → (c, samples)."""
+    """Expected deviations of flights from the calibrated model, on the grid: gains (c, n) → (c, samples)."""
     experiment = calibration.experiment
     flown = experiment.space.vector(base.gains)
     own = calibration.own_models[calibration.numbers.index(base.number)]

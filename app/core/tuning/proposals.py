@@ -1,17 +1,18 @@
 """The next gain set, computed from a campaign's frozen definition and its flights: a pure function. With it, the next
-action that is recommended to the operator.
+action that is recommended to the operator, and the prediction of a flight with any gains by the same model.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Literal
 
 from app.core.definition import Definition, Flight, LogEvidence, aborted_by_gains
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, short
 from app.core.policy import Gains
-from app.core.statistics.comparisons import Group
-from app.core.tuning.campaign_models import changed_parameters, known_distribution
+from app.core.statistics.comparisons import Group, groups_of, pool_scatter
+from app.core.tuning.calibration import fitted_flights
+from app.core.tuning.campaign_models import FITTED, changed_parameters, known_distribution
 from app.core.tuning.confirmation import (
     NO_STEP,
     compare_winner,
@@ -19,14 +20,13 @@ from app.core.tuning.confirmation import (
     describe_step,
     standing_within_bounds,
 )
-from app.core.tuning.corrected_model import start_gains, start_model
-from app.core.tuning.evidence import Evidence
-from app.core.tuning.gate import GateResult, check_policy
+from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
+from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
 from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import propose as by_hand
-from app.core.tuning.strategy import Explanation, Kind, Proposal, proposal_of
+from app.core.tuning.strategy import Evidence, Explanation, Kind, Predictor, Proposal, proposal_of
 from app.core.tuning.transfer import informed_evidence
 
 _ORIGIN = {
@@ -81,7 +81,7 @@ def _manual_proposal(evidence: Evidence[Experiment]) -> Proposal:
 def _start(evidence: Evidence[ModelledExperiment], donor: Flight | None) -> Proposal:
     experiment, log = evidence.experiment, evidence.definition.start.log
     gains = start_gains(evidence.definition, experiment, evidence.space)
-    predicted = start_model(experiment, donor).predict(evidence.space.vector(gains))
+    predicted = model_of(evidence, donor).predict(evidence.space.vector(gains))
     uncorrected = "the nominal model" if log is None else "the model of the vehicle in that log"
     source = f"{uncorrected}, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     lesson = (
@@ -147,17 +147,13 @@ def _confirmed(evidence: Evidence[Experiment], proposal: Proposal) -> Proposal:
     group = now.winner if wanted.phase == "repeat" else now.baseline
     gate = check_policy(definition, experiment, evidence.space, group.gains, flights, spread=spread)
     if not gate.passed:
-        return again(now.winner, "none", Explanation(summary=_refused(group, gate)))
+        refused = (
+            f"The best gains cannot be confirmed: {format_gains(group.gains)} cannot be flown again, because the gate "
+            f"refuses them: {' '.join(check.sentence for check in gate.refusals)}"
+        )
+        return again(now.winner, "none", Explanation(summary=refused))
     lesson = "Whether the best gains are better than the first."
     return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
-
-
-def _refused(group: Group, gate: GateResult) -> str:
-    reasons = " ".join(check.sentence for check in gate.refusals)
-    return (
-        f"The best gains cannot be confirmed: {format_gains(group.gains)} cannot be flown again, because the gate "
-        f"refuses them: {reasons}"
-    )
 
 
 def _with_notes(proposal: Proposal, evidence: Evidence[ModelledExperiment], taken: str) -> Proposal:
@@ -175,7 +171,6 @@ def _with_notes(proposal: Proposal, evidence: Evidence[ModelledExperiment], take
 AdviceKind = Literal["step", "repeat", "baseline", "stop"]
 
 _OTHER_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
-_REPEAT_SHOWS: Final = "Flying the best gains again shows whether their error stays the same."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,7 +209,8 @@ def advise(
     if now is not None and proposal.kind == "none" and tells_noise:
         budget = definition.stop.max_flights
         ended = f"{NO_STEP} the budget of {count(budget, 'flight')} is used up. " if len(flights) >= budget else ""
-        why = f"{proposal.explanation.summary} {ended}{_REPEAT_SHOWS}"
+        shows = "Flying the best gains again shows whether their error stays the same."
+        why = f"{proposal.explanation.summary} {ended}{shows}"
         return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
     if now is None or tells_noise or not (proposal.kind == "none" or is_reopened):
         is_refuted = proposal.kind == "start" and bool(aborted_by_gains(flights, proposal.gains))
@@ -225,3 +221,66 @@ def advise(
     kind = "stop" if confirmation.phase == "decided" else confirmation.phase
     chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}
     return Advice(kind=kind, gains=dict(chosen.get(kind, now.winner.gains)), why=confirmation.why)
+
+
+_UNEXPLAINED = Explanation(summary="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPredictor:
+    """The campaign's model, fitted once and asked for many gain sets.
+
+    `base` is the flight whose bias corrects the model, None for an uncorrected one.
+    """
+
+    evidence: Evidence[ModelledExperiment]
+    model: Predictor
+    base: Flight | None
+
+    def predict(self, gains: Gains) -> Proposal:
+        """Predict a flight with a complete set of gains: its curve with a band, and its error with an interval."""
+        predicted = self.model.predict(self.evidence.space.vector(gains))
+        return with_interval(self.evidence, proposal_of("manual", gains, predicted, _UNEXPLAINED), base=self.base)
+
+
+def flight_predictor(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight | None = None
+) -> FlightPredictor | None:
+    """The predictor after these flights, with the model that `next_proposal` uses for them; None without a model.
+
+    A fit takes up to half a second; a prediction some milliseconds, or a tenth of a second under ArduCopter.
+    """
+    modelled = experiment.modelled
+    if modelled is None:
+        return None
+    evidence, _ = informed_evidence(definition, modelled, flights, donor)
+    is_corrected = bool(evidence.valid) and STRATEGIES[definition.strategy].corrects_model
+    base = evidence.best if is_corrected else None
+    return FlightPredictor(evidence=evidence, model=model_of(evidence, donor), base=base)
+
+
+def model_of(evidence: Evidence[ModelledExperiment], donor: Flight | None) -> Predictor:
+    """The strategy's model; before the first valid flight the nominal one, or the one corrected by the donor's."""
+    if evidence.valid:
+        return STRATEGIES[evidence.definition.strategy].model(evidence)
+    return uncorrected_model(evidence.experiment) if donor is None else correct_by_bias(evidence.experiment, donor)
+
+
+def modelled_flights(experiment: Experiment, flights: Sequence[Flight]) -> frozenset[int]:
+    """Numbers of the flights whose records `flight_predictor` needs."""
+    valid = [flight for flight in flights if flight.outcome == "valid"]
+    used = fitted_flights(flights) if valid and isinstance(experiment, FITTED) else valid
+    return frozenset(flight.number for flight in (*valid[:1], *used))
+
+
+def predict_repeat(experiment: Experiment, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
+    """Predict another flight of gains that were flown: the mean of their flights; None if no valid flight had them.
+
+    Only the flights with these gains need their records.
+    """
+    groups = groups_of(flights)
+    group = next((each for each in groups if each.gains == gains), None)
+    if group is None:
+        return None
+    scatter = pool_scatter(groups, experiment.scatter)
+    return repeat_proposal(experiment, flights, group, scatter, "repeat", _UNEXPLAINED)

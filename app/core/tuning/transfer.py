@@ -24,8 +24,8 @@ from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.campaign_models import CALIBRATED, as_flown
 from app.core.tuning.corrected_model import correct_by_bias
-from app.core.tuning.evidence import Evidence
 from app.core.tuning.predictions import offset_sensitivity
+from app.core.tuning.strategy import Evidence
 
 LEAST_AGREEMENT: Final = 0.5
 _TAKEN: Final = {

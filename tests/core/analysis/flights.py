@@ -9,7 +9,7 @@ from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.replica.parameters import Parameters
-from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import LEAD_S
 from bench.copters.simulation import SimulatedCopter, fly_steps
 from tests.logs.recorded import recorded

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.analysis.disturbances import disturbances_of, in_other_weather
+from app.core.analysis.prediction import disturbances_of, in_other_weather
 from app.core.analysis.segment import interpolated
 from app.core.records.trajectory import Samples
 from bench.copters.simulation import SimulatedCopter, loop_of

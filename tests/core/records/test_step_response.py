@@ -5,7 +5,7 @@ from math import exp, log, pi, sqrt
 import numpy as np
 import pytest
 
-from app.core.records.step_response import StepResponse, step_response
+from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Samples
 
 STEP_S = 1e-3

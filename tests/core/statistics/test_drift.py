@@ -1,6 +1,7 @@
 """When a re-tune is due: numbers worked out by hand."""
 
-from app.core.statistics.drift import Fitted, drift
+from app.core.experiments.base import Fitted
+from app.core.statistics.drift import drift
 
 
 def hover(value: float, standard_error: float) -> dict[str, Fitted]:

@@ -8,11 +8,10 @@ from app.core.definition import Definition, Flight
 from app.core.errors import Problem
 from app.core.experiments.base import ModelledExperiment
 from app.core.policy import Gains, PolicySpace
-from app.core.tuning import definition_checks, flight_predictor, landscape, proposals
-from app.core.tuning.evidence import Evidence
-from app.core.tuning.flight_predictor import FlightPredictor
+from app.core.tuning import definition_checks, landscape, proposals
 from app.core.tuning.landscape import LandscapeGrid, LandscapePlan
-from app.core.tuning.strategy import Proposal
+from app.core.tuning.proposals import FlightPredictor
+from app.core.tuning.strategy import Evidence, Proposal
 
 
 def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flight | None = None) -> Proposal:
@@ -22,15 +21,15 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
 def fitted_predictor(
     definition: Definition, flights: Sequence[Flight], donor: Flight | None = None
 ) -> FlightPredictor | None:
-    return flight_predictor.flight_predictor(definition, experiment_of(definition), flights, donor)
+    return proposals.flight_predictor(definition, experiment_of(definition), flights, donor)
 
 
 def predict_repeat(definition: Definition, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
-    return flight_predictor.predict_repeat(experiment_of(definition), flights, gains)
+    return proposals.predict_repeat(experiment_of(definition), flights, gains)
 
 
 def modelled_flights(definition: Definition, flights: Sequence[Flight]) -> frozenset[int]:
-    return flight_predictor.modelled_flights(experiment_of(definition), flights)
+    return proposals.modelled_flights(experiment_of(definition), flights)
 
 
 def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:

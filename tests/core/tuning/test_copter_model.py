@@ -14,13 +14,12 @@ import pytest
 from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import prior_distribution
-from app.core.policy import Gains
+from app.core.policy import Box, Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.campaign_models import changed_parameters, known_distribution
 from app.core.tuning.copter_model import CopterModel
 from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Proposal
-from app.core.tuning.trust_region import Box
 from bench.copters.campaign_flights import RIGS, CampaignRig
 from tests.core.analysis.px4_flights import CALM
 from tests.core.tuning.defined import fitted_predictor, modelled_flights, next_proposal

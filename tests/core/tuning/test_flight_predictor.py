@@ -8,7 +8,7 @@ import pytest
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.tuning.calibration import MAX_FLIGHTS
-from app.core.tuning.flight_predictor import FlightPredictor
+from app.core.tuning.proposals import FlightPredictor
 from app.core.tuning.strategy import Proposal
 from tests.core.tuning.defined import fitted_predictor, modelled_flights, next_proposal, predict_repeat
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly

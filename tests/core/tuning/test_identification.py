@@ -7,7 +7,7 @@ from app.core.definition import Flight
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.models.f16 import ELEMENTS, SYSTEM, perturbed
 from app.core.records.trajectory import Trajectory
-from app.core.tuning.identification import Fit, identify
+from app.core.tuning.strategies.identified import Fit, identify
 from app.vehicles.f16 import LOG_NOISE
 from tests.vehicles.flying import HAND, TRACKING, flown
 

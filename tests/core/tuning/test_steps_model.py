@@ -9,11 +9,10 @@ import pytest
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.altitude_steps import AltitudeSteps
-from app.core.policy import Gains
+from app.core.policy import Box, Gains
+from app.core.tuning.campaign_models import StepsModel
 from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Proposal
-from app.core.tuning.trust_region import Box
-from app.core.tuning.vertical_model import StepsModel
 from bench.copters.paparazzi_simulation import SteppedVehicle, fly, within_margin
 from tests.core.tuning.defined import next_proposal
 from tests.core.tuning.flying import compiled_only

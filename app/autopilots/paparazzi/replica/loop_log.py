@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from app.core.control import vertical_guidance as loop
 from app.core.policy import Gains
-from app.core.records.overlaid import Overlay
-from app.core.records.trajectory import Samples
+from app.core.records.trajectory import Overlay, Samples
 
 FIELDS: Final = (
     "z_sp", "zd_sp", "z", "zd", "zdd", "z_ref", "zd_ref", "zdd_ref",

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from app.autopilots.paparazzi.replica.loop_log import Counts, LoopLog
 from app.core.control import vertical_guidance as loop
-from app.core.records.overlaid import Overlay
-from app.core.records.trajectory import Samples
+from app.core.records.trajectory import Overlay, Samples
 
 SIMULATED: Final = ("z_ref", "zd_ref", "zdd_ref", "z_sum_err")
 TIME_TOLERANCE_S: Final = 0.02

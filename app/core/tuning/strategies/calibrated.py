@@ -1,8 +1,7 @@
 """Fit the model to all flights, then choose its optimal gains.
 
 The model is that of the experiment (`app.core.tuning.campaign_models`). The choice is its optimum over a few plausible
-vehicles inside a trust region around the best flight (`trust_region`). A step that the gate would refuse is halved
-until it passes.
+vehicles inside a trust region around the best flight. A step that the gate would refuse is halved until it passes.
 """
 
 from collections.abc import Sequence
@@ -14,16 +13,16 @@ import numpy as np
 from app.core.definition import Flight, aborted_by_gains, was_flown
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
-from app.core.policy import PolicySpace, Vector
+from app.core.policy import Box, PolicySpace, Vector
 from app.core.tuning.campaign_models import FITTED, CampaignModel, fit
-from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import allows
 from app.core.tuning.predictions import FlightPrediction
-from app.core.tuning.strategy import Explanation, Kind, Proposal, Strategy, proposal_of
-from app.core.tuning.trust_region import Box, trust_fraction
+from app.core.tuning.strategy import Evidence, Explanation, Kind, Proposal, Strategy, proposal_of
 
 _HALVINGS: Final = 5
 _DIFFERENCE: Final = 0.1
+_SHRINK: Final = 0.5
+_GROW: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +63,26 @@ def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
         trust_fraction=fraction,
     )
     return proposal_of(choice.kind, space.mapping(choice.gains), prediction, explanation, spread=model.spread)
+
+
+def trust_fraction(flights: Sequence[Flight]) -> float:
+    """Allowed step as a share of each gain's range, at most 1, from the flights in order.
+
+    Starts at the whole range. Halved after a flight aborted because of its gains, and after one whose error exceeds its
+    predicted interval; doubled after one inside the interval. The first valid flight is ignored, because its prediction
+    did not come from a calibrated model.
+    """
+    fraction, is_calibrated = 1.0, False
+    for flight in flights:
+        if flight.outcome == "aborted":
+            fraction *= _SHRINK if flight.against_gains else 1.0
+        elif is_calibrated and flight.error is not None and (predicted := flight.predicted) is not None:
+            if predicted.upper is not None and flight.error > predicted.upper:
+                fraction *= _SHRINK
+            elif predicted.lower is not None and flight.error >= predicted.lower:
+                fraction = min(fraction * _GROW, 1.0)
+        is_calibrated = is_calibrated or flight.outcome == "valid"
+    return fraction
 
 
 def fitted_model(evidence: Evidence[ModelledExperiment]) -> CampaignModel:

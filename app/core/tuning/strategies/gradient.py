@@ -21,9 +21,8 @@ from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.campaign_models import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
-from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import allows
-from app.core.tuning.strategy import Explanation, Kind, LadderStep, Proposal, Strategy, proposal_of
+from app.core.tuning.strategy import Evidence, Explanation, Kind, LadderStep, Proposal, Strategy, proposal_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 from app.autopilots.registry import EXPERIMENTS
 from app.core.definition import Definition, Flight, Prediction, StopRule
 from app.core.formatting import short
+from app.core.policy import Box
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.predictions import predict_flight, remaining_bias
+from app.core.tuning.campaign_models import find_robust_optimum, merit
+from app.core.tuning.predictions import predict_flight, remaining_biases
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.calibrated import CALIBRATED, propose
 from app.core.tuning.strategy import Proposal
-from app.core.tuning.trust_region import Box, find_robust_optimum, merit
 from bench.predictions import prediction_of
 from tests.core.tuning.bowl import QuadraticExperiment
 from tests.core.tuning.bowl import fly as fly_bowl
@@ -247,8 +248,9 @@ def test_what_remains_reproduces_the_flight_and_fades_without_a_recorded_command
     )
     calibration = calibrate(TAKEOFF, [without_thrust(bent)])
     here, far = SPACE.vector(DEFAULT), np.array([3000.0, 1000, 200])
-    assert remaining_bias(calibration, without_thrust(bent), here) == pytest.approx(calibration.residual, abs=1e-12)
-    assert np.abs(remaining_bias(calibration, without_thrust(bent), far)).max() < 1e-6
+    near, beyond = remaining_biases(calibration, without_thrust(bent), np.stack((here, far)))
+    assert near == pytest.approx(calibration.residual, abs=1e-12)
+    assert np.abs(beyond).max() < 1e-6
     recorded = predict_flight(calibrate(TAKEOFF, [flight]), flight, here)
     assert recorded.error == pytest.approx(flight.error, rel=0.05)
 

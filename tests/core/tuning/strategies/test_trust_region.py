@@ -4,7 +4,7 @@ from typing import Literal
 import pytest
 
 from app.core.definition import Flight, Prediction
-from app.core.tuning.trust_region import trust_fraction
+from app.core.tuning.strategies.calibrated import trust_fraction
 from tests.core.tuning.bowl import fly
 
 Came = Literal["held", "missed", "better", "aborted", "cautious", "untold"]
