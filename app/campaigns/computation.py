@@ -50,7 +50,9 @@ def compute(past: CampaignHistory) -> ProposalComputation:
 
     Takes up to a second, or some seconds under ArduCopter and PX4; call it outside of any transaction.
     """
-    definition, flights = _with_reopening(past), past.flights
+    stop, flights = past.definition.stop, past.flights
+    budget = max(stop.max_flights, past.open_until_flight)  # with the flights for which the campaign was reopened
+    definition = replace(past.definition, stop=replace(stop, max_flights=budget))
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, experiment, flights, past.donor)
     stop_verdict = evaluate_stop_rule(
@@ -82,12 +84,6 @@ def compute(past: CampaignHistory) -> ProposalComputation:
             is_reopened=len(flights) < past.open_until_flight,
         ),
     )
-
-
-def _with_reopening(past: CampaignHistory) -> Definition:
-    """The definition with a budget that includes the flights for which the campaign was reopened."""
-    stop = past.definition.stop
-    return replace(past.definition, stop=replace(stop, max_flights=max(stop.max_flights, past.open_until_flight)))
 
 
 def warm_up() -> None:

@@ -348,9 +348,6 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     return get_vehicle(session, row.vehicle_id)
 
 
-_NAME_ROOM: Final = 100
-
-
 def rehearse(session: Session, campaign_id: int) -> Campaign:
     """Return the rehearsal of this campaign: the one that is under way or passed, else a new draft on a simulation with
     the same definition and safe gains.
@@ -372,7 +369,7 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
         )
     made = add_campaign(
         session,
-        f"Rehearsal: {row.name[:_NAME_ROOM]}",
+        f"Rehearsal: {row.name[:100]}",
         Definition.model_validate(row.definition),
         simulation,
         parent_id=row.id,
