@@ -17,7 +17,7 @@ from app.compare.compared_flights import (
     sides_of,
     vehicle_name,
 )
-from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
+from app.compare.schemas import ComparedFlight, FlightComparison
 from app.compare.verdicts import compare_pairs, find_leading_pair, list_notes, overall_verdict
 from app.core.records.trajectory import CHANNEL_UNITS, Samples
 from app.db import trajectories
@@ -41,7 +41,26 @@ def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightCompari
         verdict=verdict,
         sentence=sentence,
         notes=list_notes(sides),
-        flights=[_flight(side, own) for side, own in zip(sides, settings, strict=True)],
+        flights=[
+            ComparedFlight.view_of(
+                side.row,
+                trial_id=side.row.id,
+                label=side.label,
+                name=side.name,
+                campaign_name=side.campaign.name,
+                vehicle=vehicle_name(side.campaign),
+                is_real=side.campaign.vehicle.is_real,
+                experiment=side.experiment.title,
+                group=None
+                if side.group is None
+                else GroupBrief(
+                    mean=side.group.mean, standard_error=side.group.known_error(side.scatter), n=side.group.size
+                ),
+                scatter=side.scatter.reported,
+                settings=own,
+            )
+            for side, own in zip(sides, settings, strict=True)
+        ],
         gains=gain_differences(sides),
         settings=setting_differences(settings),
         pairs=compare_pairs(sides, leading),
@@ -77,25 +96,6 @@ def _column(curve: Curve | None, grid: Samples) -> list[str]:
         return [""] * len(grid)
     values = np.interp(grid, curve.time_s, curve.values, left=np.nan, right=np.nan)
     return ["" if np.isnan(value) else f"{value:.6g}" for value in values]
-
-
-def _flight(side: ComparisonFlight, settings: list[FlightSetting]) -> ComparedFlight:
-    row, campaign, group = side.row, side.campaign, side.group
-    return ComparedFlight.view_of(
-        row,
-        trial_id=row.id,
-        label=side.label,
-        name=side.name,
-        campaign_name=campaign.name,
-        vehicle=vehicle_name(campaign),
-        is_real=campaign.vehicle.is_real,
-        experiment=side.experiment.title,
-        group=None
-        if group is None
-        else GroupBrief(mean=group.mean, standard_error=group.known_error(side.scatter), n=group.size),
-        scatter=side.scatter.reported,
-        settings=settings,
-    )
 
 
 def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonData:

@@ -87,7 +87,11 @@ def overall_verdict(leading: LeadingPair | None) -> tuple[Verdict | None, str]:
     if leading is None:
         return None, "No verdict: fewer than two of these flights have an error that counts."
     pair = compare_pair(leading.best, leading.other, candidates=leading.candidates)
-    return pair.verdict, f"{_among(leading.best, leading.policies)}{pair.sentence}"
+    among = (
+        f"{capitalised(leading.best.name)} is the lowest of {leading.policies} gain sets, and the confidence allows "
+        "for this choice. "
+    )
+    return pair.verdict, f"{among if leading.policies > 2 else ''}{pair.sentence}"
 
 
 def compare_pairs(sides: Sequence[ComparisonFlight], leading: LeadingPair | None) -> list[FlightPair]:
@@ -123,14 +127,6 @@ def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
 def _rank(side: ComparisonFlight) -> tuple[float, str]:
     assert side.group is not None
     return side.group.mean + side.group.standard_error(side.scatter), side.label
-
-
-def _among(best: ComparisonFlight, policies: int) -> str:
-    if policies <= 2:
-        return ""
-    return (
-        f"{capitalised(best.name)} is the lowest of {policies} gain sets, and the confidence allows for this choice. "
-    )
 
 
 def _pair(
