@@ -22,7 +22,6 @@ class CampaignHistory:
     the number of flights for which the campaign was reopened, 0 if it was not.
     """
 
-    campaign_id: int
     definition: Definition
     flights: tuple[Flight, ...]
     digest: str
@@ -98,4 +97,4 @@ def warm_up() -> None:
         error=experiment.error(flown),
         outcome="valid",
     )
-    compute(CampaignHistory(campaign_id=0, definition=definition, flights=(flight,), digest=""))
+    compute(CampaignHistory(definition=definition, flights=(flight,), digest=""))

@@ -4,7 +4,7 @@ For a worker: `read_plan`, then `app.core.tuning.landscape` (pure, in any proces
 Only the newest landscape of a campaign is kept.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -31,16 +31,9 @@ LANDSCAPE_JOB: Final = "landscape"
 _STORED: Final = TypeAdapter(Landscape)
 
 
-@dataclass(frozen=True, slots=True)
-class LandscapeAnswer:
-    """The card, and whether a job still has to be requested for its content."""
-
-    card: Card
-    wanted: bool = False
-
-
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> LandscapeAnswer:
-    """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> tuple[Card, bool]:
+    """The landscape of the latest proposal, or why there is none; and whether a job still has to be requested for it.
+    Raises NotFoundError for an unknown campaign."""
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     definition = definition_of(campaign)
@@ -54,7 +47,7 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stac
     if found is None:
         return _not_yet(session, campaign, proposal)
     drawn = history_of(session, campaign_id, curves=False)
-    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
+    return card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)), False
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
@@ -102,7 +95,7 @@ def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
     return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
 
 
-def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> LandscapeAnswer:
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> tuple[Card, bool]:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed. Their landscape follows.")
     job = _job(session, campaign.id, proposal.id)
@@ -120,11 +113,9 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     return _waiting(reason, wanted=wanted)
 
 
-def _waiting(reason: str, *, wanted: bool = False) -> LandscapeAnswer:
-    return LandscapeAnswer(
-        Card(name=LandscapeFigure.name, title="Error landscape of the model", state="waiting", reason=reason),
-        wanted=wanted,
-    )
+def _waiting(reason: str, *, wanted: bool = False) -> tuple[Card, bool]:
+    title = "Error landscape of the model"
+    return Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted
 
 
 def _name(campaign_id: int) -> str:

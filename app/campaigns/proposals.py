@@ -48,7 +48,6 @@ def read_history(session: Session, campaign_id: int) -> CampaignHistory:
     row = repository.get_campaign(session, campaign_id)
     definition, trials = definition_of(row), history.trials_of(session, campaign_id)
     return CampaignHistory(
-        campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
         digest=history.history_digest(session, row, definition, trials),
