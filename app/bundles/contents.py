@@ -7,6 +7,7 @@ versions below 4 lack rise time, settling time and steady-state error, below 5 t
 the ends of flights, of which they have the words.
 """
 
+from collections.abc import Set
 from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -76,6 +77,10 @@ def _concise(given: FlightEnd) -> FlightEnd:
 
 class _Strict(Schema):
     model_config = ConfigDict(extra="forbid", from_attributes=True)
+
+    def values_without(self, names: Set[str]) -> dict[str, Any]:
+        """The other fields with their values as they came; a dump would change the types of stored numbers."""
+        return {name: getattr(self, name) for name in type(self).model_fields.keys() - names}
 
 
 class Manifest(_Strict):

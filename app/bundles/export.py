@@ -61,7 +61,13 @@ class Packer:
             try:
                 contents = Contents(campaigns=[self._campaign(row) for row in campaigns])
             except ValidationError as error:
-                raise _too_much(error) from error
+                first = error.errors(include_url=False, include_input=False)[0]  # mostly a list that is too long
+                where = ".".join(map(str, first["loc"]))
+                raise ConflictError(
+                    "This campaign, or one that it starts from, cannot be exported as a bundle: "
+                    f"{where}: {first['msg']}.",
+                    hint="No data is lost. Export its report and the records of its trials one by one.",
+                ) from error
             self._write(CONTENTS, _json(contents.model_dump(mode="json")), squeeze=True)
             manifest = Manifest(
                 format=FORMAT, version=VERSION, program=__version__, made_at=utc_now(), parts=self._digests
@@ -100,47 +106,30 @@ class Packer:
             row,
             vehicle=_vehicle(row.vehicle),
             trials=[
-                self._trial(
+                Trial.view_of(
                     trial,
-                    None if trial.proposal_id is None else places.get(trial.proposal_id),
-                    photos.get(trial.id, []),
-                    flights.get(trial.id),
+                    proposal=None if trial.proposal_id is None else places.get(trial.proposal_id),
+                    record=self._record(trial.trajectory, refused_for((trial,), "The bundle was not created")),
+                    predicted=self._record(trial.predicted, _spoilt(f"flight {trial.number}", row.id)),
+                    photos=[self._photo(trial, photo) for photo in photos.get(trial.id, [])],
+                    telemetry=self._telemetry(trial, flights.get(trial.id)),
                 )
                 for trial in history.trials_of(self._session, row.id)
             ],
-            proposals=[self._proposal(proposal) for proposal in proposals],
+            proposals=[
+                Proposal.view_of(
+                    proposal, predicted=self._record(proposal.predicted, _spoilt(f"proposal {proposal.id}", row.id))
+                )
+                for proposal in proposals
+            ],
         )
 
-    def _trial(self, row: TrialRow, proposal: int | None, photos: list[TrialPhotoRow], flight: int | None) -> Trial:
-        return Trial.view_of(
-            row,
-            proposal=proposal,
-            record=self._flown(row),
-            predicted=self._predicted(row.predicted, f"flight {row.number}", row.campaign_id),
-            photos=[self._photo(row, photo) for photo in photos],
-            telemetry=self._telemetry(row, flight),
-        )
-
-    def _proposal(self, row: ProposalRow) -> Proposal:
-        predicted = self._predicted(row.predicted, f"proposal {row.id}", row.campaign_id)
-        return Proposal.view_of(row, predicted=predicted)
-
-    def _predicted(self, row: TrajectoryRow | None, whose: str, campaign_id: int) -> Record | None:
-        if row is not None and not is_intact(row):
-            raise StorageError(
-                f"The bundle was not created: the predicted curve of {whose} of campaign {campaign_id} is damaged.",
-                hint="Restore the database from an earlier backup.",
-            )
-        return self._record(row)
-
-    def _flown(self, row: TrialRow) -> Record | None:
-        if row.trajectory is not None and not is_intact(row.trajectory):
-            raise refused_for((row,), "The bundle was not created")
-        return self._record(row.trajectory)
-
-    def _record(self, row: TrajectoryRow | None) -> Record | None:
+    def _record(self, row: TrajectoryRow | None, damaged: StorageError) -> Record | None:
+        """Write the record, if there is one. Raises `damaged` when it is that."""
         if row is None:
             return None
+        if not is_intact(row):
+            raise damaged
         part = self._write(f"records/{row.id}.zst", row.data)
         self._session.expire(row, ["data"])
         return Record.view_of(row, part=part, codec=1)
@@ -165,16 +154,6 @@ class Packer:
         return None if found is None else self._write(f"telemetry/{row.id}.tlog", found.read_bytes(), squeeze=True)
 
 
-def _too_much(error: ValidationError) -> ConflictError:
-    """Error for what the database holds and a bundle may not, mostly lists that are too long."""
-    first = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(map(str, first["loc"]))
-    return ConflictError(
-        f"This campaign, or one that it starts from, cannot be exported as a bundle: {where}: {first['msg']}.",
-        hint="No data is lost. Export its report and the records of its trials one by one.",
-    )
-
-
 def _vehicle(row: VehicleRow) -> Vehicle:
     """The vehicle's description; for a placeholder, that of the vehicle it stands for."""
     described = Vehicle.model_validate(row)
@@ -182,6 +161,13 @@ def _vehicle(row: VehicleRow) -> Vehicle:
         return described
     kind, name = origin
     return described.model_copy(update={"kind": kind, "name": name, "registered": True})
+
+
+def _spoilt(whose: str, campaign_id: int) -> StorageError:
+    return StorageError(
+        f"The bundle was not created: the predicted curve of {whose} of campaign {campaign_id} is damaged.",
+        hint="Restore the database from an earlier backup.",
+    )
 
 
 def _digest(data: bytes) -> str:

@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
 from app.autopilots.registry import EXPERIMENTS
-from app.bundles.contents import CONTENTS, Campaign, Proposal, Record, Trial
+from app.bundles.contents import CONTENTS, Campaign, Record, Trial
 from app.bundles.reader import Bundle, trajectory_row
 from app.campaigns import history
 from app.campaigns import service as campaigns
@@ -30,7 +29,6 @@ from app.vehicles.registry import VEHICLE_KINDS, check_options
 _SET_HERE: Final = {"id", "name", "definition", "safe_gains", "vehicle", "vehicle_options", "trials", "proposals"}
 """Fields of a campaign that are not stored as they came."""
 _AT_ONCE_BYTES: Final = 16 * 2**20
-_HINT: Final = "Import it with the version of Gainline that wrote it, or update this installation."
 
 
 def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[int, int]) -> CampaignRow:
@@ -45,7 +43,7 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
         vehicle=vehicle,
         vehicle_options=options,
         updated_at=utc_now(),
-        **_fields(source, _SET_HERE),
+        **source.values_without(_SET_HERE),
     )
     return added(session, row)
 
@@ -81,13 +79,6 @@ def _vehicle(session: Session, where: str, source: Campaign) -> tuple[VehicleRow
     return fleet.chosen_vehicle(session, choice, default_gains=vehicle.safe_gains), options
 
 
-def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, source: Proposal) -> ProposalRow:
-    row = ProposalRow(
-        campaign_id=campaign.id, predicted=_record(bundle, source.predicted), **_fields(source, {"predicted"})
-    )
-    return added(session, row)
-
-
 def _trials(
     session: Session, bundle: Bundle, campaign: CampaignRow, sources: Sequence[Trial], proposals: Sequence[ProposalRow]
 ) -> list[TrialRow]:
@@ -96,7 +87,14 @@ def _trials(
     waiting: list[TrajectoryRow | TrialPhotoRow] = []
     size = 0
     for each in sources:
-        row = _trial(bundle, campaign, each, proposals)
+        row = TrialRow(
+            campaign_id=campaign.id,
+            proposal_id=None if each.proposal is None else proposals[each.proposal].id,
+            trajectory=_record(bundle, each.record),
+            predicted=_record(bundle, each.predicted),
+            curve=None if each.curve is None else [list(point) for point in each.curve],
+            **each.values_without({"proposal", "record", "predicted", "photos", "telemetry", "curve"}),
+        )
         photos = [
             TrialPhotoRow(trial=row, media_type=one.media_type, data=bundle.part(one.part), added_at=one.added_at)
             for one in each.photos
@@ -121,29 +119,15 @@ def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> N
     waiting.clear()
 
 
-def _trial(bundle: Bundle, campaign: CampaignRow, source: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
-    return TrialRow(
-        campaign_id=campaign.id,
-        proposal_id=None if source.proposal is None else proposals[source.proposal].id,
-        trajectory=_record(bundle, source.record),
-        predicted=_record(bundle, source.predicted),
-        curve=None if source.curve is None else [list(point) for point in source.curve],
-        **_fields(source, {"proposal", "record", "predicted", "photos", "telemetry", "curve"}),
-    )
-
-
 def _record(bundle: Bundle, source: Record | None) -> TrajectoryRow | None:
     return None if source is None else trajectory_row(source, bundle.part(source.part))
 
 
-def _fields(source: BaseModel, without: set[str]) -> JsonObject:
-    """Fields of a model with their values as they came; a dump would change the types of stored numbers."""
-    return {name: getattr(source, name) for name in type(source).model_fields.keys() - without}
-
-
 def _refused(field: str, reason: str) -> InputError:
     return InputError(
-        "This bundle cannot be imported; nothing was stored.", problems=(Problem(field, reason),), hint=_HINT
+        "This bundle cannot be imported; nothing was stored.",
+        problems=(Problem(field, reason),),
+        hint="Import it with the version of Gainline that wrote it, or update this installation.",
     )
 
 
@@ -163,7 +147,15 @@ def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignVi
     for place, campaign in enumerate(bundle.contents.campaigns):
         row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
         new_ids[campaign.id] = row.id
-        proposals = [_proposal(session, bundle, row, each) for each in campaign.proposals]
+        proposals = [
+            added(
+                session,
+                ProposalRow(
+                    campaign_id=row.id, predicted=_record(bundle, each.predicted), **each.values_without({"predicted"})
+                ),
+            )
+            for each in campaign.proposals
+        ]
         made = _trials(session, bundle, row, campaign.trials, proposals)
         telemetry |= {
             new.id: trial.telemetry for new, trial in zip(made, campaign.trials, strict=True) if trial.telemetry

@@ -19,7 +19,7 @@ import zstandard
 from pydantic import BaseModel, ValidationError
 
 from app.autopilots.registry import EXPERIMENTS
-from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Photo, Record
+from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Record
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
@@ -136,7 +136,10 @@ class Bundle:
             for number, trial in enumerate(campaign.trials):
                 for photo in trial.photos:
                     used.add(_once(used, f"{field}.trials.{number}.photos", photo.part))
-                    self._check_photo(f"{field}.trials.{number}.photos", photo)
+                    if media_type_of(self.part(photo.part, PHOTO_BYTES)) != photo.media_type:
+                        _refuse(
+                            f"{field}.trials.{number}.photos.media_type", f"differs from the content of {photo.part}"
+                        )
                 if trial.telemetry is not None:
                     used.add(_once(used, f"{field}.trials.{number}.telemetry", trial.telemetry))
                     self.part(trial.telemetry)
@@ -201,14 +204,10 @@ class Bundle:
         if not all(np.isfinite(each).all() for each in values) or (np.diff(trajectory.time_s) <= 0).any():
             _refuse(f"{field}.part", "contains a number that is not finite, or time that does not increase")
 
-    def _check_photo(self, field: str, photo: Photo) -> None:
-        if media_type_of(self.part(photo.part, PHOTO_BYTES)) != photo.media_type:
-            _refuse(f"{field}.media_type", f"differs from the content of {photo.part}")
-
 
 def trajectory_row(record: Record, data: bytes) -> TrajectoryRow:
-    """The record as a row; every field as it came, because a dump would change the types of stored numbers."""
-    return TrajectoryRow(data=data, **{name: getattr(record, name) for name in Record.model_fields.keys() - {"part"}})
+    """The record as a row, with these samples."""
+    return TrajectoryRow(data=data, **record.values_without({"part"}))
 
 
 def _output_of(field: str, campaign: Campaign) -> str:

@@ -73,7 +73,10 @@ def read_campaign_file(path: Path) -> CampaignFile:
         definition, _ = check_campaign(file.definition, file.vehicle)
         gains_by_hand(file, definition)
     except InputError as error:
-        problems = tuple(_located(document, _steps(problem.field), problem.reason) for problem in error.problems)
+        problems = tuple(
+            _located(document, [int(step) if step.isdecimal() else step for step in each.field.split(".")], each.reason)
+            for each in error.problems
+        )
         raise _no_campaign(path, problems) from error
     return file
 
@@ -134,11 +137,6 @@ def _load(path: Path) -> "CommentedMap":
             problems=(Problem("line 1", "must contain fields: `name: …` and so on"),),
         )
     return document
-
-
-def _steps(field: str) -> list[str | int]:
-    """Path to a field, from text such as `gains.0.kp`."""
-    return [int(part) if part.isdecimal() else part for part in field.split(".")]
 
 
 def _located(document: "CommentedMap", where: Sequence[str | int], reason: str) -> Problem:
@@ -212,7 +210,14 @@ def override(
     if strategy is not None and strategy != file.definition.strategy:
         chosen |= {("definition", "strategy"): strategy, ("definition", "options"): {}}
     if start is not None:
-        chosen[("definition", "start")] = _start(start, file.definition.experiment)
+        chosen[("definition", "start")] = (
+            {"kind": start}
+            if start in ("default", "simplex")
+            else {
+                "kind": "given",
+                "gains": _gains(start, file.definition.experiment, "--start", "default, simplex, or "),
+            }
+        )
     if gains:
         chosen[("gains",)] = [_gains(text, file.definition.experiment, "--gains") for text in gains]
     if seed is not None:
@@ -221,12 +226,6 @@ def override(
         chosen[("definition", "stop", "max_flights")] = max_flights
     changed = with_settings(file, chosen)
     return with_settings(changed, _assignments(changed, settings)) if settings else changed
-
-
-def _start(text: str, experiment: str) -> Mapping[str, object]:
-    if text in ("default", "simplex"):
-        return {"kind": text}
-    return {"kind": "given", "gains": _gains(text, experiment, "--start", "default, simplex, or ")}
 
 
 def _gains(text: str, experiment: str, option: str, others: str = "") -> dict[str, float]:

@@ -22,7 +22,6 @@ class CampaignHistory:
     the number of flights for which the campaign was reopened, 0 if it was not.
     """
 
-    campaign_id: int
     definition: Definition
     flights: tuple[Flight, ...]
     digest: str
@@ -50,7 +49,9 @@ def compute(past: CampaignHistory) -> ProposalComputation:
 
     Takes up to a second, or some seconds under ArduCopter and PX4; call it outside of any transaction.
     """
-    definition, flights = _with_reopening(past), past.flights
+    stop, flights = past.definition.stop, past.flights
+    budget = max(stop.max_flights, past.open_until_flight)  # with the flights for which the campaign was reopened
+    definition = replace(past.definition, stop=replace(stop, max_flights=budget))
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, experiment, flights, past.donor)
     stop_verdict = evaluate_stop_rule(
@@ -84,12 +85,6 @@ def compute(past: CampaignHistory) -> ProposalComputation:
     )
 
 
-def _with_reopening(past: CampaignHistory) -> Definition:
-    """The definition with a budget that includes the flights for which the campaign was reopened."""
-    stop = past.definition.stop
-    return replace(past.definition, stop=replace(stop, max_flights=max(stop.max_flights, past.open_until_flight)))
-
-
 def warm_up() -> None:
     """Import and compile what a proposal needs, so that the first one is as fast as the others."""
     definition, experiment = Definition(), Takeoff()
@@ -102,4 +97,4 @@ def warm_up() -> None:
         error=experiment.error(flown),
         outcome="valid",
     )
-    compute(CampaignHistory(campaign_id=0, definition=definition, flights=(flight,), digest=""))
+    compute(CampaignHistory(definition=definition, flights=(flight,), digest=""))

@@ -81,7 +81,13 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
     A registered vehicle has options of its own, so none are returned; its gains are compared with the experiment's in
     `fleet`. Raises InputError that names everything invalid in either.
     """
-    _require_whole(asked)
+    donor = asked.start.donor
+    if donor is not None and donor.trial_number is None:
+        raise InputError(
+            "Invalid campaign.",
+            problems=(Problem("definition.start.donor", "is allowed with start.kind 'campaign' only"),),
+            hint="Remove the donor, or set start.kind to 'campaign'.",
+        )
     definition = core_definition(asked)
     options: dict[str, OptionValue] = {}
 
@@ -101,16 +107,6 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
             hint="Correct the fields listed, then try again; nothing was changed.",
         )
     return definition, options
-
-
-def _require_whole(asked: DefinitionIn) -> None:
-    donor = asked.start.donor
-    if donor is not None and donor.trial_number is None:
-        raise InputError(
-            "Invalid campaign.",
-            problems=(Problem("definition.start.donor", "is allowed with start.kind 'campaign' only"),),
-            hint="Remove the donor, or set start.kind to 'campaign'.",
-        )
 
 
 def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionValue]) -> Iterator[Problem]:

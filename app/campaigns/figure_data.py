@@ -16,7 +16,7 @@ from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
 from app.core.experiments.base import Experiment, Scatter
-from app.core.records.flight_events import FlightEvent, flight_events, pinned_notes
+from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
 from app.core.tuning.strategy import Interval, band_channels
@@ -255,9 +255,7 @@ def _curve_id(row: TrialRow) -> int | None:
 
 def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:
     """A stored predicted curve and its band, where there are any."""
-    if curve_id is None:
-        return None, None
-    predicted = trajectories.readable_of(session, [curve_id]).get(curve_id)
+    predicted = None if curve_id is None else trajectories.readable_of(session, [curve_id]).get(curve_id)
     if predicted is None:
         return None, None
     lower, upper = band_channels(output)
@@ -269,6 +267,7 @@ def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicte
 def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
     campaign = repository.get_campaign(session, row.campaign_id)
     experiment = experiment_of_campaign(campaign)
+    set_points = experiment.set_points
     set_point, modelled = _goal(experiment)
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)
     best = history.best_of(trials)
@@ -291,16 +290,13 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,
         panels=() if record is None else tuple(_panels(record)),
-        events=() if record is None or experiment.output != "altitude_m" else _events(experiment, record, glitches_s),
+        events=()
+        if record is None or experiment.output != "altitude_m"
+        else flight_events(record, glitches_s, () if set_points is None else set_points.pushes),
         notes=pinned_notes(row.note),
         is_over=row.state in history.FLOWN,
         by_reference=experiment.target_channel is not None,
     )
-
-
-def _events(experiment: Experiment, record: Trajectory, glitches_s: Sequence[float]) -> tuple[FlightEvent, ...]:
-    set_points = experiment.set_points
-    return flight_events(record, glitches_s, () if set_points is None else set_points.pushes)
 
 
 def _throttle(record: Trajectory) -> Curve:

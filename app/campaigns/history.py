@@ -245,13 +245,16 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
 
 def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
     outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
+    interval = row.predicted_interval or {}
     return Flight(
         number=row.number,
         gains=row.gains,
         trajectory=trajectory,
         error=row.error,
         outcome=outcome,
-        predicted=_predicted(row),
+        predicted=None
+        if row.predicted_error is None
+        else Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper")),
         against_gains=_is_against_gains(row),
         parameters=parameters,
     )
@@ -269,13 +272,6 @@ def _numbers(settings: OptionsJson) -> dict[str, float]:
 def _is_against_gains(row: TrialRow) -> bool:
     """Whether an aborted trial counts against its gains; True for every other trial."""
     return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
-
-
-def _predicted(row: TrialRow) -> Prediction | None:
-    if row.predicted_error is None:
-        return None
-    interval = row.predicted_interval or {}
-    return Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper"))
 
 
 def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:

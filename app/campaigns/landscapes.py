@@ -4,7 +4,7 @@ For a worker: `read_plan`, then `app.core.tuning.landscape` (pure, in any proces
 Only the newest landscape of a campaign is kept.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session
 
 from app.autopilots.registry import experiment_of, space_of
 from app.campaigns import history, repository
-from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
 from app.campaigns.figure_data import history_of
 from app.campaigns.proposals import is_stale, read_history
@@ -29,32 +28,26 @@ from app.jobs import service as jobs
 
 LANDSCAPE_JOB: Final = "landscape"
 
-_TITLE: Final = "Error landscape of the model"
 _STORED: Final = TypeAdapter(Landscape)
-_EVERY: Final = tuple(JobState)
 
 
-@dataclass(frozen=True, slots=True)
-class LandscapeAnswer:
-    """The card, and whether a job still has to be requested for its content."""
-
-    card: Card
-    wanted: bool = False
-
-
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> LandscapeAnswer:
-    """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> tuple[Card, bool]:
+    """The landscape of the latest proposal, or why there is none; and whether a job still has to be requested for it.
+    Raises NotFoundError for an unknown campaign."""
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
-    if (never := _impossible(campaign)) is not None:
-        return _waiting(never)
+    definition = definition_of(campaign)
+    if experiment_of(definition).modelled is None:
+        return _waiting("There is no model of this vehicle's controller, so no landscape can be computed.")
+    if free_gains(space_of(definition)) < 2:
+        return _waiting("The campaign's bounds leave fewer than two gains free; a landscape needs two.")
     if proposal is None:
         return _waiting("The landscape appears here once the first gains are proposed.")
     found = _result(session, campaign_id, proposal.id)
     if found is None:
         return _not_yet(session, campaign, proposal)
     drawn = history_of(session, campaign_id, curves=False)
-    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
+    return card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)), False
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
@@ -81,11 +74,13 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
             "The campaign's flights have changed since these gains were proposed.",
             hint="No action is needed: the landscape of the next proposal replaces it.",
         )
+    # The centre is the flight that the proposal starts from, else the proposal itself.
+    base = next((each for each in past.flights if each.number == proposal.explanation.get("base_flight")), proposal)
     return LandscapePlan(
         definition=past.definition,
         flights=past.flights,
         donor=past.donor,
-        centre=_grid_centre(past, proposal),
+        centre=dict(base.gains),
         marks=(*(flight.gains for flight in past.flights), proposal.gains),
     )
 
@@ -100,16 +95,7 @@ def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
     return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
 
 
-def _impossible(campaign: CampaignRow) -> str | None:
-    definition = definition_of(campaign)
-    if experiment_of(definition).modelled is None:
-        return "There is no model of this vehicle's controller, so no landscape can be computed."
-    if free_gains(space_of(definition)) < 2:
-        return "The campaign's bounds leave fewer than two gains free; a landscape needs two."
-    return None
-
-
-def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> LandscapeAnswer:
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> tuple[Card, bool]:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed. Their landscape follows.")
     job = _job(session, campaign.id, proposal.id)
@@ -127,8 +113,9 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     return _waiting(reason, wanted=wanted)
 
 
-def _waiting(reason: str, *, wanted: bool = False) -> LandscapeAnswer:
-    return LandscapeAnswer(Card(name=LandscapeFigure.name, title=_TITLE, state="waiting", reason=reason), wanted=wanted)
+def _waiting(reason: str, *, wanted: bool = False) -> tuple[Card, bool]:
+    title = "Error landscape of the model"
+    return Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted
 
 
 def _name(campaign_id: int) -> str:
@@ -137,7 +124,7 @@ def _name(campaign_id: int) -> str:
 
 def _job(session: Session, campaign_id: int, proposal_id: int) -> JobRow | None:
     """The newest landscape job, if it is for that proposal."""
-    job = jobs.latest_ordered(session, LANDSCAPE_JOB, _name(campaign_id), _EVERY)
+    job = jobs.latest_ordered(session, LANDSCAPE_JOB, _name(campaign_id), tuple(JobState))
     return job if job is not None and (job.order or {}).get("proposal_id") == proposal_id else None
 
 
@@ -151,13 +138,6 @@ def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape |
     if job is None or job.result is None or job.result["proposal_id"] != proposal_id:
         return None
     return _STORED.validate_python(job.result["landscape"])
-
-
-def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, float]:
-    """Gains of the flight that the proposal starts from, else the proposal's own."""
-    number = proposal.explanation.get("base_flight")
-    base = next((flight for flight in past.flights if flight.number == number), None)
-    return dict(proposal.gains if base is None else base.gains)
 
 
 def _search(proposal: ProposalRow) -> Search:

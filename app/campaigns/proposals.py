@@ -1,20 +1,24 @@
-"""Proposals: computed as a job from the stored history, and stored with that history's digest and the gate's result.
+"""Proposals: computed as a job from the stored history, and stored with that history's digest and the gate's result;
+and the gains that may be flown instead: a smaller step, the best gains again, the first ones again.
 
 For a worker: `read_history`, then `computation.compute` (pure, in any process), then `store_proposal`.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Final
 
+import numpy as np
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import experiment_of, space_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of, frozen_digest
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
+from app.campaigns.schemas import ChoiceKind, Variant
+from app.campaigns.statistics import standing_within_bounds_of
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
 from app.core.definition import Definition, Flight
@@ -29,7 +33,6 @@ from app.db.types import JsonObject, utc_now
 from app.jobs import service as jobs
 
 PROPOSAL_JOB: Final = "proposal"
-_COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
 _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "aborted again": Outcome.STOPPED,
     "flight budget": Outcome.BUDGET,
@@ -45,7 +48,6 @@ def read_history(session: Session, campaign_id: int) -> CampaignHistory:
     row = repository.get_campaign(session, campaign_id)
     definition, trials = definition_of(row), history.trials_of(session, campaign_id)
     return CampaignHistory(
-        campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
         digest=history.history_digest(session, row, definition, trials),
@@ -116,7 +118,7 @@ def _apply_to_campaign(session: Session, campaign: CampaignRow, verdict: StopVer
 
 def request_proposal(session: Session, campaign: CampaignRow) -> None:
     """Request a job that computes the proposal, after a change of the history or on request."""
-    if campaign.state in _COMPUTED_IN:
+    if campaign.state != CampaignState.ARCHIVED:
         jobs.enqueue_job(session, PROPOSAL_JOB, campaign_id=campaign.id)
 
 
@@ -261,3 +263,74 @@ def safe_gains_changed(session: Session, vehicle_id: int) -> None:
     for row in repository.unflown_on(session, vehicle_id):
         cancel_outdated(session, row)
         request_proposal(session, row)
+
+
+_KINDS: Final[Mapping[str, ChoiceKind]] = {
+    "start": "baseline",
+    "step": "step",
+    "shorter step": "step",
+    "repeat": "repeat",
+    "baseline": "baseline",
+}
+_ORDER: Final[tuple[ChoiceKind, ...]] = ("step", "smaller step", "repeat", "baseline")
+
+
+def variant_gains(session: Session, campaign: CampaignRow, variant: Variant) -> dict[str, float]:
+    """Gains of a variant.
+
+    `repeat`: the best gains by all their flights; `baseline`: the first flight's; `smaller step`: half way from the
+    best to the present proposal. Like the advice, it ignores flights outside the campaign's bounds. Raises
+    ConflictError before the first valid flight inside the bounds, and where half a step rounds to none.
+    """
+    trials = history.trials_of(session, campaign.id)
+    proposed = require_fresh_proposal(session, campaign).gains if variant == "smaller step" else None
+    found = _variants(campaign, trials, proposed)
+    if not found:
+        raise ConflictError(
+            f"A {variant} needs a valid flight inside the bounds; campaign {campaign.id} has none yet.",
+            hint="Fly the first proposal.",
+        )
+    if variant not in found:
+        raise ConflictError(
+            "The proposed step cannot be made smaller: half of it is less than one count.",
+            hint="Fly the proposal, or repeat the best gains.",
+        )
+    return found[variant]
+
+
+def choices_of(
+    campaign: CampaignRow, proposal: ProposalRow, trials: Sequence[TrialRow]
+) -> dict[ChoiceKind, dict[str, float]]:
+    """The gain sets that the next flight may use, each once, in a fixed order; the proposal's are among them."""
+    variants = _variants(campaign, trials, proposal.gains)
+    flown: tuple[Variant, ...] = ("repeat", "baseline")
+    # Proposals of kind `none` and `manual` were flown, unless the bounds have moved them.
+    again = next((kind for kind in flown if variants.get(kind) == proposal.gains), None)
+    own: ChoiceKind = _KINDS.get(proposal.kind, again or "step")
+    others: dict[ChoiceKind, dict[str, float]] = {
+        kind: gains
+        for kind, gains in variants.items()
+        if kind != own and gains != proposal.gains and (kind != "smaller step" or own == "step")
+    }
+    if others.get("baseline") == variants.get("repeat"):
+        others.pop("baseline", None)
+    found = {own: dict(proposal.gains), **others}
+    return {kind: found[kind] for kind in _ORDER if kind in found}
+
+
+def _variants(
+    campaign: CampaignRow, trials: Sequence[TrialRow], proposed: Gains | None
+) -> dict[Variant, dict[str, float]]:
+    """Every variant that there is; none before the first valid flight inside the bounds."""
+    now = standing_within_bounds_of(campaign, trials)
+    if now is None:
+        return {}
+    best = dict(now.winner.gains)
+    found: dict[Variant, dict[str, float]] = {"repeat": best, "baseline": dict(now.baseline.gains)}
+    if proposed is not None:
+        space = space_of(definition_of(campaign))
+        target = space.vector(proposed)
+        half = space.mapping(space.nearest((space.vector(best) + target) / 2.0))
+        if half != best and not np.array_equal(space.vector(half), target):
+            found["smaller step"] = half
+    return found

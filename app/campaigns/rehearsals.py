@@ -18,7 +18,6 @@ from app.fleet import service as fleet
 FLIGHTS: Final = 3
 """Number of valid flights that passes a rehearsal, unless the campaign's own rule ends it earlier."""
 _FAILED_STATES: Final = frozenset({TrialState.ABORTED, TrialState.INVALID, TrialState.LOST})
-_NOT_NEEDED: Final = Rehearsal(state="not needed", campaign_id=None, reason="")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +59,7 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     After the campaign's first flight both are frozen, so later safe gains of the vehicle need no other rehearsal.
     """
     if not fleet.needs_staging(campaign.vehicle):
-        return _NOT_NEEDED
+        return Rehearsal(state="not needed", campaign_id=None, reason="")
     held = repository.rehearsals(session, campaign.id)
     wanted = definition_of(campaign).digest()
     flown = (row for row in held if not row.vehicle.is_real and definition_of(row).digest() == wanted)

@@ -167,10 +167,15 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     return campaign_view(session, add_campaign(session, name, definition, vehicle, parent_id=origin.id))
 
 
-def _get_permitted(session: Session, campaign_id: int, context: RequestContext) -> CampaignRow:
-    """The campaign, to be changed. Raises NotAllowedError for one on a real vehicle when the client lacks the key."""
+def _get_permitted(
+    session: Session, campaign_id: int, context: RequestContext, action: str | None = None
+) -> CampaignRow:
+    """The campaign, to be changed. Raises NotAllowedError for one on a real vehicle when the client lacks the key, and
+    ConflictError when its state does not allow the action."""
     row = repository.get_campaign(session, campaign_id)
     require_may(Permission.REVIEW, row.vehicle, context)
+    if action is not None:
+        check_action(CAMPAIGN_ACTIONS, action, row.state, f"Campaign {row.id}")
     return row
 
 
@@ -227,8 +232,7 @@ def delete_campaign(session: Session, campaign_id: int, version: int, context: R
 
 def finish_campaign(session: Session, campaign_id: int, reason: str, context: RequestContext) -> Campaign:
     """Finish a campaign on the operator's decision. Raises ConflictError unless it is between flights."""
-    row = _get_permitted(session, campaign_id, context)
-    check_action(CAMPAIGN_ACTIONS, "finish", row.state, f"Campaign {row.id}")
+    row = _get_permitted(session, campaign_id, context, "finish")
     _require_no_flight(session, row)
     end_campaign(session, row, Outcome.STOPPED, reason)
     return campaign_view(session, row)
@@ -237,8 +241,7 @@ def finish_campaign(session: Session, campaign_id: int, reason: str, context: Re
 def reopen_campaign(session: Session, campaign_id: int, flights: int, context: RequestContext) -> Campaign:
     """Reopen a finished campaign for this many more flights. Raises ConflictError unless it is finished, and for a
     rehearsal, because its result lets another campaign fly."""
-    row = _get_permitted(session, campaign_id, context)
-    check_action(CAMPAIGN_ACTIONS, "reopen", row.state, f"Campaign {row.id}")
+    row = _get_permitted(session, campaign_id, context, "reopen")
     if (rehearsed := repository.rehearsed_id(session, row.id)) is not None:
         raise ConflictError(
             f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, which depends on its result.",
@@ -252,8 +255,7 @@ def reopen_campaign(session: Session, campaign_id: int, flights: int, context: R
 
 def archive_campaign(session: Session, campaign_id: int, context: RequestContext) -> Campaign:
     """Archive a campaign. Raises ConflictError unless it is finished."""
-    row = _get_permitted(session, campaign_id, context)
-    check_action(CAMPAIGN_ACTIONS, "archive", row.state, f"Campaign {row.id}")
+    row = _get_permitted(session, campaign_id, context, "archive")
     set_campaign_state(row, CampaignState.ARCHIVED)
     return campaign_view(session, row)
 
@@ -348,9 +350,6 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     return get_vehicle(session, row.vehicle_id)
 
 
-_NAME_ROOM: Final = 100
-
-
 def rehearse(session: Session, campaign_id: int) -> Campaign:
     """Return the rehearsal of this campaign: the one that is under way or passed, else a new draft on a simulation with
     the same definition and safe gains.
@@ -372,7 +371,7 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
         )
     made = add_campaign(
         session,
-        f"Rehearsal: {row.name[:_NAME_ROOM]}",
+        f"Rehearsal: {row.name[:100]}",
         Definition.model_validate(row.definition),
         simulation,
         parent_id=row.id,

@@ -135,7 +135,18 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
         sigma=0.0 if scatter.identical else scatter.reported,
         degrees_of_freedom=scatter.degrees_of_freedom if scatter.known else 0.0,
         scatter_source=_scatter_source(experiment, () if now is None else now.groups, scatter, row.vehicle),
-        groups=[] if now is None else [_group(now, group) for group in now.groups],
+        groups=[]
+        if now is None
+        else [
+            RepeatGroup.view_of(
+                group,
+                trial_numbers=group.numbers,
+                standard_error=group.known_error(scatter),
+                is_baseline=group is now.baseline,
+                is_best=group is now.winner,
+            )
+            for group in now.groups
+        ],
         comparison=None if now is None else _comparison(experiment, now),
         drift=drift,
         battery_trend=None
@@ -193,16 +204,6 @@ def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestT
         mean=group.mean,
         standard_error=group.known_error(now.scatter),
         flights=group.size,
-    )
-
-
-def _group(now: ComparisonState, group: Group) -> RepeatGroup:
-    return RepeatGroup.view_of(
-        group,
-        trial_numbers=group.numbers,
-        standard_error=group.known_error(now.scatter),
-        is_baseline=group is now.baseline,
-        is_best=group is now.winner,
     )
 
 

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
-from app.campaigns.proposals import PROPOSAL_JOB, is_stale
+from app.campaigns.proposals import PROPOSAL_JOB, choices_of, is_stale
 from app.campaigns.rehearsals import is_rehearsal_satisfied, passed_rehearsals, rehearsal_of
 from app.campaigns.schemas import (
     Campaign,
@@ -26,7 +26,6 @@ from app.campaigns.schemas import (
     Winner,
 )
 from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
-from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
 from app.common.schemas import Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
@@ -78,7 +77,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         ),
         standing=_standing(row, repeatable),
         trials=_counts(trials),
-        flying=_flying(flight, trials),
+        flying=None if flight is None else FlyingTrial(trial_id=flight.trial_id, trial_number=flight.trial.number),
         next_action=_next_action(row, trials, rehearsal),
         actions=_actions(session, row, flight),
     )
@@ -157,7 +156,12 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
     verdict = StopVerdict(
         stop=stop["stop"], reason=stop["reason"] or "", sentence=stop["why"], threshold=stop["threshold"]
     )
-    advice = _advice(row, verdict)
+    advice = (
+        Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
+        if row.advice is None  # a row of a release without advice
+        else _ADVICE.validate_python(row.advice)
+    )
+    is_doubtful = row.kind == "start" and bool(aborted_by_gains(history.flown_gains(trials), row.gains))
     predicted_error, interval = history.told_prediction(
         row.predicted_error, row.interval, corrected=history.is_corrected(trials)
     )
@@ -169,7 +173,15 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
             name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
             for name, value in row.gains.items()
         },
-        choices=_choices(campaign, row, trials, advice),
+        choices=[
+            FlightChoice(
+                kind=kind,
+                gains=gains,
+                proposed=gains == row.gains,
+                recommended=advice.kind != "stop" and gains == advice.gains and not is_doubtful,
+            )
+            for kind, gains in choices_of(campaign, row, trials).items()
+        ],
         predicted_error=predicted_error,
         interval=interval,
         stop_verdict=verdict,
@@ -183,26 +195,6 @@ def _present_gains(campaign: CampaignRow, trials: Sequence[TrialRow]) -> Mapping
         return within.winner.gains
     best = history.best_of(trials)
     return campaign.vehicle.safe_gains if best is None else best.gains
-
-
-def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow], advice: Advice) -> list[FlightChoice]:
-    is_doubtful = row.kind == "start" and bool(aborted_by_gains(history.flown_gains(trials), row.gains))
-    return [
-        FlightChoice(
-            kind=kind,
-            gains=gains,
-            proposed=gains == row.gains,
-            recommended=advice.kind != "stop" and gains == advice.gains and not is_doubtful,
-        )
-        for kind, gains in choices_of(campaign, row, trials).items()
-    ]
-
-
-def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
-    """The advice as stored; for rows of releases without advice, the stop rule's verdict and the proposal."""
-    if row.advice is not None:
-        return _ADVICE.validate_python(row.advice)
-    return Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
 
 
 def _verdict(now: ComparisonState | None) -> Verdict | None:
@@ -227,13 +219,6 @@ def _counts(trials: Sequence[TrialRow]) -> TrialCounts:
         invalid=states[TrialState.INVALID],
         lost=states[TrialState.LOST],
     )
-
-
-def _flying(flight: FlightRow | None, trials: Sequence[TrialRow]) -> FlyingTrial | None:
-    if flight is None:
-        return None
-    number = next(trial.number for trial in trials if trial.id == flight.trial_id)
-    return FlyingTrial(trial_id=flight.trial_id, trial_number=number)
 
 
 def _next_action(
@@ -273,13 +258,17 @@ def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> 
     found: Mapping[int, list[SparkCurve]] = defaultdict(list)
     for campaign, trials in chosen.items():
         best = history.best_of(trials)
-        found[campaign].extend(_spark(trial, curves[trial.id], best) for trial in trials if trial.id in curves)
+        found[campaign].extend(
+            SparkCurve(
+                trial_number=trial.number,
+                best=trial is best,
+                time_s=[time_s for time_s, _ in curves[trial.id]],
+                values=[value for _, value in curves[trial.id]],
+            )
+            for trial in trials
+            if trial.id in curves
+        )
     return found
-
-
-def _spark(trial: TrialRow, curve: Sequence[Sequence[float]], best: TrialRow | None) -> SparkCurve:
-    time_s, values = ([point[axis] for point in curve] for axis in (0, 1))
-    return SparkCurve(trial_number=trial.number, best=trial is best, time_s=time_s, values=values)
 
 
 def _sparking(trials: Sequence[TrialRow]) -> list[TrialRow]:

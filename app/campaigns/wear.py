@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.common.schemas import Schema
 from app.core.experiments.base import Fitted
-from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, drift
+from app.core.statistics.drift import MONITORED_PARAMETERS, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.theme import ThemeName
@@ -79,8 +79,7 @@ def _estimates(session: Session, vehicle_id: int) -> tuple[list[Estimate], list[
     trials = history.trials_of(session, *(row.id for row in campaigns))
     flown = sorted((row for row in trials if row.flown_at is not None), key=lambda row: (str(row.flown_at), row.id))
     counts = {(row.campaign_id, row.number): place for place, row in enumerate(flown, start=1)}
-    found = list(_fits(session, campaigns, counts))
-    found.sort(key=lambda one: (one.flight, one.proposal_id))
+    found = sorted(_fits(session, campaigns, counts), key=lambda one: (one.flight, one.proposal_id))
     over = {row.id for row in campaigns if row.outcome is not None}
     last = {one.campaign_id: one.flight for one in found}
     ends = [one.flight for one in found if one.campaign_id in over and one.flight == last[one.campaign_id]]
@@ -104,35 +103,29 @@ def _fits(session: Session, campaigns: Sequence[CampaignRow], counts: dict[tuple
             if known and row.explanation.get("fitted"):
                 newest[max(known)] = row, max(numbers)
         for flight, (row, number) in newest.items():
-            yield _estimate(row, flight, number)
-
-
-def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
-    fitted = {each["name"]: each for each in row.explanation["fitted"]}
-    return Estimate(
-        flight=flight,
-        campaign_id=row.campaign_id,
-        trial_number=number,
-        proposal_id=row.id,
-        at=row.computed_at,
-        fitted=[fitted[name] for name in MONITORED_PARAMETERS if name in fitted],
-    )
+            fitted = {each["name"]: each for each in row.explanation["fitted"]}
+            yield Estimate(
+                flight=flight,
+                campaign_id=row.campaign_id,
+                trial_number=number,
+                proposal_id=row.id,
+                at=row.computed_at,
+                fitted=[fitted[name] for name in MONITORED_PARAMETERS if name in fitted],
+            )
 
 
 def _retune(estimates: Sequence[Estimate], ends: Sequence[int]) -> Retune:
+    since = max(ends, default=None)
     if not estimates:
         finding = "No data yet: no campaign with the calibrated model has flown on this vehicle."
-        return Retune(due=False, since=None, drifted=[], sentence=finding)
-    if not ends:
+    elif since is None:
         finding = "No verdict yet: no campaign with the calibrated model is finished on this vehicle."
-        return Retune(due=False, since=None, drifted=[], sentence=finding)
-    since = max(ends)
-    tuned = next(one for one in reversed(estimates) if one.flight == since)
-    if tuned is estimates[-1]:
+    else:
+        tuned = next(one for one in reversed(estimates) if one.flight == since)
+        if tuned is not estimates[-1]:
+            return Retune.view_of(drift(_by_name(tuned), _by_name(estimates[-1])), since=since)
         finding = f"Tuned with flight {since}; no campaign with the calibrated model has flown since."
-        return Retune(due=False, since=since, drifted=[], sentence=finding)
-    found: Drift = drift(_by_name(tuned), _by_name(estimates[-1]))
-    return Retune(due=found.due, since=since, drifted=list(found.drifted), sentence=found.sentence)
+    return Retune(due=False, since=since, drifted=[], sentence=finding)
 
 
 def _by_name(one: Estimate) -> dict[str, Fitted]:

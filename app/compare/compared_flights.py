@@ -254,8 +254,5 @@ def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> lis
 
 
 def _change(first: OptionValue | None, value: OptionValue | None) -> int | float | None:
-    if any(one is None or isinstance(one, bool | str) for one in (first, value)):
-        return None
-    assert isinstance(first, int | float)
-    assert isinstance(value, int | float)
-    return value - first
+    numbers = [one for one in (value, first) if isinstance(one, int | float) and not isinstance(one, bool)]
+    return numbers[0] - numbers[1] if len(numbers) == 2 else None

@@ -11,10 +11,6 @@ from app.common.states import TrialState
 from app.core.statistics.comparisons import Verdict
 
 Basis = Literal["gains", "repeats", "apart", "no error"]
-_BASIS = (
-    "kind of comparison: different `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, "
-    "because their vehicles or experiments differ; or none, because one of them has `no error`"
-)
 
 
 class FlightSetting(Schema):
@@ -83,7 +79,14 @@ class FlightPair(Schema):
 
     trial_id: int
     against_id: int
-    basis: Annotated[Basis, Field(description=_BASIS)]
+    basis: Annotated[
+        Basis,
+        Field(
+            description="kind of comparison: different `gains` on one vehicle; `repeats` of the same gains; flights "
+            "that are `apart`, because their vehicles or experiments differ; or none, because one of them has "
+            "`no error`"
+        ),
+    ]
     verdict: Verdict | None
     confidence: float | None
     difference: float | None

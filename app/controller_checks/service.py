@@ -62,7 +62,6 @@ class ControllerCheck(ControllerCheckSummary):
 
 
 _UNNAMED: Final = "recording"
-_NEWEST_FIRST: Final = Order("-id", ControllerCheckRow.id.expression, descending=True)
 _RESULT: Final = TypeAdapter(Result)
 
 
@@ -85,10 +84,6 @@ def examine_example() -> Result:
     return examine_file(RECORDED_TAKEOFF)
 
 
-def store_example(session: Session, result: Result) -> ControllerCheck:
-    return store_check(session, RECORDED_TAKEOFF.name, result)
-
-
 def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
     """Store the result of a check; the recording itself is not kept."""
     row = ControllerCheckRow(
@@ -105,7 +100,7 @@ def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[Con
     return page_of(
         session,
         select(ControllerCheckRow),
-        _NEWEST_FIRST,
+        Order("-id", ControllerCheckRow.id.expression, descending=True),
         cursor=cursor,
         limit=limit,
         view=lambda rows: [ControllerCheckSummary.view_of(row) for row in rows],

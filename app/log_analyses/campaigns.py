@@ -16,11 +16,10 @@ from app.campaigns.trials.schemas import TrialPlan
 from app.campaigns.trials.service import evaluate_gate
 from app.common.schemas import uploaded_name
 from app.core.experiments.takeoff import Takeoff as Experiment
-from app.core.policy import Gains
 from app.core.tuning.logged_takeoffs import comparable_takeoffs
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
-from app.log_analyses.copter_start import CopterStart
+from app.log_analyses.manoeuvres import CopterStart
 from app.log_analyses.takeoffs import logged_takeoffs
 
 _UNNAMED: Final = "Log"
@@ -70,12 +69,8 @@ def _start_takeoffs(session: Session, found: Sequence[Takeoff], context: Request
         ),
     )
     for each in used:
-        plan = TrialPlan(gains=_planned(session, campaign_id, each.gains), note=f"Takeoff {each.number} of {name}")
+        passed = evaluate_gate(session, campaign_id, each.gains).passed  # if not, the record corrects the gains
+        planned = dict(each.gains) if passed else Experiment.space.mapping(Experiment.space.default)
+        plan = TrialPlan(gains=planned, note=f"Takeoff {each.number} of {name}")
         plan_and_import(session, campaign_id, plan, records[each.number], context, confirmed=True, invalid=False)
     return campaigns.get_campaign(session, campaign_id)
-
-
-def _planned(session: Session, campaign_id: int, flown: Gains) -> dict[str, float]:
-    """The gains to plan: those flown, or the default ones where the gate refuses these; the record corrects them."""
-    passed = evaluate_gate(session, campaign_id, flown).passed
-    return dict(flown if passed else Experiment.space.mapping(Experiment.space.default))

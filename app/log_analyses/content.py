@@ -12,7 +12,6 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_analyses import manoeuvres, takeoffs
-from app.log_analyses.copter_start import CopterStart, start_of
 from app.log_analyses.schemas import LogAnswer
 from app.logs.formats import HEAD_BYTES, Format, recognise
 
@@ -39,11 +38,11 @@ def _read(content: bytes, companion: bytes | None, name: str) -> LoggedFlight | 
     return list(reader.takeoffs(recording)) if flight is None else flight
 
 
-def read_start(content: bytes, companion: bytes | None, name: str) -> list[Takeoff] | CopterStart:
+def read_start(content: bytes, companion: bytes | None, name: str) -> list[Takeoff] | manoeuvres.CopterStart:
     """Read what a campaign starts with: the takeoffs of a Paparazzi log, or the gains proposed from a copter's, which
     takes some seconds. Raises InputError that names what is missing or wrong."""
     found = _read(content, companion, name)
-    return start_of(analyze(found), name) if isinstance(found, LoggedFlight) else found
+    return manoeuvres.start_of(analyze(found), name) if isinstance(found, LoggedFlight) else found
 
 
 def analyze_content(content: bytes, companion: bytes | None, name: str) -> tuple[LogAnswer, Plot]:

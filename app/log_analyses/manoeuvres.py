@@ -1,15 +1,21 @@
-"""The answer of an ArduCopter's or PX4's log, for a person: its facts, table, notes, parameter file and figure."""
+"""The answer of an ArduCopter's or PX4's log, for a person: its facts, table, notes, parameter file and figure; and
+what a campaign takes of it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.registry import EXPERIMENTS
 from app.core.analysis.analysis import Analysis, Assessment
 from app.core.analysis.proposal import EXTRA_LAG_S, LARGEST_ACTIVITY, LARGEST_MARGIN, REQUIRED_MARGIN
+from app.core.definition import LogEvidence
+from app.core.errors import Problem, TrajectoryError
+from app.core.experiments.copter_steps import CopterSteps, vector_of
 from app.core.formatting import format_gains, percent
 from app.core.records.trajectory import Samples
 from app.figures.panels import Line, Panel, Plot
-from app.log_analyses.copter_start import STEPS
 from app.log_analyses.schemas import (
     EstimatedValue,
     EstimatedVehicle,
@@ -20,6 +26,9 @@ from app.log_analyses.schemas import (
     ParameterFile,
 )
 
+_STEPS: Final[Mapping[str, CopterSteps]] = MappingProxyType(
+    {each.autopilot: each for each in EXPERIMENTS.values() if isinstance(each, CopterSteps)}
+)
 _LEAST_SPREAD: Final = 0.01
 _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
@@ -35,7 +44,7 @@ def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> Log
         answer=analysis.answer,
         proposes=analysis.proposed is not None,
         starts_campaign=analysis.proposed is not None,
-        experiment=STEPS[analysis.loop.texts.autopilot].name,
+        experiment=_STEPS[analysis.loop.texts.autopilot].name,
         flight=_flight(analysis),
         vehicle=_vehicle(analysis),
         gains=_table(analysis),
@@ -172,3 +181,40 @@ def _mm(metres: float) -> str:
 
 def _rounded(values: Samples) -> tuple[float, ...]:
     return tuple(round(value, 5) for value in values.tolist())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CopterStart:
+    """The experiment, the gains of the first flight by the names of its space, and what the log tells."""
+
+    experiment: str
+    gains: Mapping[str, float]
+    log: LogEvidence
+
+
+def start_of(analysis: Analysis, file_name: str) -> CopterStart:
+    """The start of a campaign with the proposed gains. Raises TrajectoryError if the analysis proposes none."""
+    if analysis.proposed is None:
+        raise TrajectoryError(
+            f"No campaign starts from {file_name}.",
+            hint=analysis.answer,
+            problems=(Problem("file", "gives no better gains to begin with"),),
+        )
+    experiment = _STEPS[analysis.loop.texts.autopilot]
+    parameters = analysis.loop.firmware_parameters
+    proposed = experiment.loop_parameters(analysis.proposed.gains)
+    space = experiment.space
+    mean, deviation = (vector_of(each).tolist() for each in (analysis.estimate.mean, analysis.estimate.deviation))
+    return CopterStart(
+        experiment=experiment.name,
+        gains=space.mapping(space.nearest(space.vector({name: parameters[name] for name in space.names} | proposed))),
+        log=LogEvidence(
+            file_name=file_name,
+            error_m=analysis.behaviour.error_m,
+            vehicle={
+                each.name: (min(max(value, each.lower), each.upper), spread)
+                for each, value, spread in zip(experiment.model_parameters, mean, deviation, strict=True)
+            },
+            parameters=parameters,
+        ),
+    )

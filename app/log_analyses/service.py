@@ -10,7 +10,7 @@ from app.processes.sandbox import FILE, run_limited
 
 if TYPE_CHECKING:
     from app.autopilots.takeoffs import Takeoff
-    from app.log_analyses.copter_start import CopterStart
+    from app.log_analyses.manoeuvres import CopterStart
 
 
 def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> LogAnalysis:

@@ -144,19 +144,18 @@ def _table(analysis: TakeoffAnalysis) -> GainsTable:
     listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
     return GainsTable(
         columns=["Gains", *flown.gains, "Flown", "Predicted", "90 % interval", "Gate"],
-        rows=[_row(each) for each in listed],
+        rows=[
+            [
+                each.name,
+                *(f"{value:g}" for value in each.gains.values()),
+                f"{number(each.flown_error_m)} m" if each.flown_error_m is not None else number(None),
+                f"{number(each.predicted_error_m)} m",
+                f"{number(each.interval.lower)} … {number(each.interval.upper)} m",
+                "refused" if each.refusal else "passed",
+            ]
+            for each in listed
+        ],
     )
-
-
-def _row(each: AssessedGains) -> list[str]:
-    return [
-        each.name,
-        *(f"{value:g}" for value in each.gains.values()),
-        f"{number(each.flown_error_m)} m" if each.flown_error_m is not None else number(None),
-        f"{number(each.predicted_error_m)} m",
-        f"{number(each.interval.lower)} … {number(each.interval.upper)} m",
-        "refused" if each.refusal else "passed",
-    ]
 
 
 def _notes(analysis: TakeoffAnalysis) -> list[str]:

@@ -19,7 +19,7 @@ from app.common.conflict_checks import state_label
 from app.core import formatting
 from app.core.tuning.strategy import Interval
 from app.figures.base import Card, Cell, Column
-from app.reports.sections import Photo, Report
+from app.reports.service import Photo, Report
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -63,6 +63,7 @@ def render(report: Report, plotly: str) -> Document:
     library = _script(plotly)
     own = _policy(library, draw)
     groups = report.statistics.groups
+    drawn = {card.name: card.figure for card in report.cards if card.state == "ready"}
     html = (
         _environment()
         .get_template("report.html.j2")
@@ -74,7 +75,7 @@ def render(report: Report, plotly: str) -> Document:
             winner=next((group for group in groups if group.is_best), None),
             policy=own,
             css=Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8")),  # noqa: S704  # ours
-            figures=_data(report),
+            figures=Markup(json.dumps(drawn, ensure_ascii=False).replace("<", "\\u003c")),  # noqa: S704  # no `<` is left
             plotly=library,
             draw=draw,
         )
@@ -112,12 +113,6 @@ def _script(source: str) -> Markup:
     if "</script" in source.lower() or "<!--" in source:
         raise ValueError("this script would end early inside a page")
     return Markup(source)  # noqa: S704  # ours and the library's, checked above
-
-
-def _data(report: Report) -> Markup:
-    """The figures as JSON that cannot contain a tag."""
-    drawn = {card.name: card.figure for card in report.cards if card.state == "ready"}
-    return Markup(json.dumps(drawn, ensure_ascii=False).replace("<", "\\u003c"))  # noqa: S704  # no `<` is left
 
 
 def _policy(*scripts: Markup) -> str:

@@ -41,7 +41,13 @@ def print_pdf(page: Callable[[], str]) -> bytes:
 
     Raises UnavailableError if there is no browser, all slots are in use, or printing fails; and whatever `page` raises.
     """
-    browser = _browser()
+    browser = next(filter(None, map(shutil.which, PRINTERS)), None)
+    if browser is None:
+        raise UnavailableError(
+            "Chromium is not installed on this server; PDF reports need it.",
+            hint="Open the HTML report and print it from your browser (Save as PDF); or install Chromium on the "
+            "computer that runs Gainline.",
+        )
     if not _places.acquire(blocking=False):
         raise UnavailableError(
             f"{MAX_CONCURRENT} reports are already being printed.",
@@ -52,17 +58,6 @@ def print_pdf(page: Callable[[], str]) -> bytes:
             return _printed(browser, page(), Path(folder))
     finally:
         _places.release()
-
-
-def _browser() -> str:
-    found = next(filter(None, map(shutil.which, PRINTERS)), None)
-    if found is None:
-        raise UnavailableError(
-            "Chromium is not installed on this server; PDF reports need it.",
-            hint="Open the HTML report and print it from your browser (Save as PDF); or install Chromium on the "
-            "computer that runs Gainline.",
-        )
-    return found
 
 
 def _printed(browser: str, html: str, folder: Path) -> bytes:

@@ -1,37 +1,283 @@
-"""Collects the content of a report: the API's own views, without computing anything new."""
+"""The content of a report as plain data, collected from the API's own views without computing anything new: the
+campaign's frozen settings, anomalies in the order of the flights, notes and photos, limited to a file size that can
+still be sent.
+"""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Final, TypeVar
 
 from sqlalchemy.orm import Session
 
 from app import __version__
+from app.autopilots.registry import EXPERIMENTS
 from app.campaigns import figure_data
 from app.campaigns import service as campaigns
+from app.campaigns.history import FLOWN
 from app.campaigns.landscapes import landscape_card
-from app.campaigns.schemas import Campaign
-from app.campaigns.statistics import campaign_statistics
+from app.campaigns.schemas import Campaign, Start, StopRule
+from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.trials import service as trials_service
+from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.schemas import Page
+from app.common.states import AbortCause
+from app.core.definition import Option, OptionValue, with_defaults
+from app.core.experiments.base import Experiment
+from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
+from app.core.policy import Gain
+from app.core.tuning.stop_rules import describe_budget
+from app.core.tuning.strategies import STRATEGIES
+from app.db.models import TrialPhotoRow
 from app.db.trajectories import damaged_trials
 from app.db.types import utc_now
 from app.figures import CAMPAIGN_FIGURES
-from app.figures.base import card_of
+from app.figures.base import Card, card_of
 from app.fleet import service as fleet
+from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
 from app.fleet.views import acts_view, ledger_view
-from app.reports import sections
-from app.reports.sections import (
-    Anomaly,
-    Report,
-    describe_method,
-    describe_safe_gains,
-    describe_vehicle,
-    experiment_of,
-)
+from app.vehicles.base import Identity
+from app.vehicles.end_texts import cause_text
+from app.vehicles.flight_end import FlightEnd
+from app.vehicles.registry import VEHICLE_KINDS
 
 _PAGE: Final = 200
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One setting: title and value."""
+
+    title: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Anomaly:
+    """An anomaly: its flight (None if it belongs to none), its kind, and a description."""
+
+    flight: int | None
+    kind: str
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Photo:
+    """An unmodified photo."""
+
+    media_type: str
+    data: bytes
+    added_at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Remark:
+    """Remarks on a trial: its note, the photos that fit into the report, and the number of those left out."""
+
+    trial: Trial
+    photos: tuple[Photo, ...]
+    left_out: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """A campaign as the API returns it, with its settings described and its figures drawn for a light page.
+
+    `remarks` are in the order of the trials, with at most `photo_bytes` of photos in all; `what` was tuned and `how`;
+    `anomalies` are in the order of the flights; `made_at` is the time of creation, by program `version`.
+    """
+
+    campaign: Campaign
+    statistics: CampaignStatistics
+    trials: tuple[Trial, ...]
+    experiment: str
+    gains: tuple[Gain, ...]
+    what: tuple[Fact, ...]
+    how: tuple[Fact, ...]
+    cards: tuple[Card, ...]
+    remarks: tuple[Remark, ...]
+    photo_bytes: int
+    anomalies: tuple[Anomaly, ...]
+    version: str
+    made_at: datetime
+
+    @property
+    def flown(self) -> tuple[Trial, ...]:
+        """Trials that left the ground: those in the table of runs."""
+        return tuple(trial for trial in self.trials if trial.state in FLOWN)
+
+
+_STARTS: Final = {
+    "default": "the vehicle's default gains",
+    "simplex": "best gains on the model (simplex)",
+    "given": "custom gains",
+    "campaign": "the best of another campaign",
+}
+
+
+def describe_vehicle(
+    campaign: Campaign, experiment: Experiment, identity: Identity | None, safe_gains: str
+) -> Iterator[Fact]:
+    """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
+    vehicle = campaign.vehicle
+    kind = VEHICLE_KINDS.get(vehicle.kind)
+    yield Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})")
+    yield Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation")
+    if identity is not None:
+        known = f"{identity.autopilot} {identity.version}".strip()
+        hardware = f", hardware id {identity.uid}" if identity.uid else ""
+        yield Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}")
+    titled = () if kind is None else [replace(each, title=each.label or each.title) for each in kind.options]
+    autopilot = vehicle.options.get("autopilot")
+    foreign = {each.name for each in titled if each.autopilots and autopilot not in each.autopilots}
+    yield from _options({name: value for name, value in vehicle.options.items() if name not in foreign}, titled)
+    if vehicle.can_fly:
+        yield Fact("Safe gains", safe_gains)
+    yield Fact("Experiment", experiment.title)
+    yield from _options(with_defaults(campaign.definition.experiment_options, experiment.options), experiment.options)
+    for each in experiment.space.gains:
+        unit = f" ({each.unit})" if each.unit else ""
+        yield Fact(f"Gain {each.name}", f"{each.title}{unit}, {gain(each.lower)} … {gain(each.upper)}")
+
+
+def describe_method(campaign: Campaign, experiment: Experiment) -> Iterator[Fact]:
+    """Strategy, start, bounds and stop rule, each with its settings."""
+    definition = campaign.definition
+    strategy = STRATEGIES.get(definition.strategy)
+    yield Fact("Strategy", definition.strategy if strategy is None else strategy.title)
+    yield from _options(definition.options, () if strategy is None else strategy.options)
+    yield Fact("Start", _start(definition.start))
+    for name, (low, high) in definition.bounds.items():
+        yield Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}")
+    first, later = short_percent(definition.first_step_fraction), short_percent(definition.step_fraction)
+    yield Fact("Maximum step", f"{first} of each gain's range until a flight is valid, then {later}")
+    if experiment.output == "altitude_m":
+        yield Fact("Gate ceiling", f"{definition.ceiling_m:g} m")
+    yield Fact("Stop rule", _stop(definition.stop, campaign.open_until_flight))
+    if campaign.vehicle.can_fly and not campaign.vehicle.registered:
+        yield Fact("Seed", str(definition.seed))
+
+
+def _options(chosen: Mapping[str, OptionValue], known: Iterable[Option]) -> Iterator[Fact]:
+    described = {each.name: each for each in known}
+    for name, value in chosen.items():
+        found = described.get(name)
+        if value != "":
+            yield (
+                Fact(name, setting_text(value)) if found is None else Fact(found.title, setting_text(value, found.unit))
+            )
+
+
+def _start(start: Start) -> str:
+    origin = _STARTS[start.kind]
+    if start.donor is not None:
+        origin = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
+    if start.log is not None:
+        origin = f"the gains proposed from {start.log.file_name}"
+    return origin if start.gains is None else f"{origin}: {format_gains(start.gains)}"
+
+
+def _stop(stop: StopRule, open_until_flight: int) -> str:
+    most = f"at most {describe_budget(stop.max_flights, open_until_flight)}, invalid ones not counted"
+    rules = {
+        "paper": f"two consecutive flights less than {short_percent(stop.improvement)} better than the best; {most}",
+        "noise": f"no resolvable improvement at {short_percent(stop.confidence)} confidence; {most}",
+        "budget": most,
+    }
+    battery = "" if stop.min_battery_v is None else f"; or a flight that ends below {stop.min_battery_v:g} V"
+    return f"{rules[stop.kind]}{battery}"
+
+
+_ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
+_CAUSES: Final[Mapping[AbortCause, str]] = {
+    "limit": "(A limit was exceeded: it counts against the gains.)",
+    "operator": "(No cause was given. It does not count against the gains.)",
+    "behaved badly": "(Cause given by the operator: vehicle behaviour. It counts against the gains.)",
+    "something else": "(Cause given by the operator: something else. It does not count against the gains.)",
+}
+
+
+def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
+    """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
+    for trial in trials:
+        if (kind := _ENDINGS.get(trial.state)) is not None:
+            reason = trial.given_reason or _end_beside(trial.state, trial.end) or "No reason was given."
+            counting = f" {_CAUSES[trial.abort_cause]}" if trial.state == "aborted" and trial.abort_cause else ""
+            yield Anomaly(trial.number, kind, f"{reason}{counting}")
+        if trial.overrule_reason:
+            refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
+            yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} Refused by the gate: {refused}")
+        if trial.read_back is not None and trial.read_back != trial.gains:
+            planned, held = (format_gains(gains, EXACT_DIGITS) for gains in (trial.gains, trial.read_back))
+            sentence = f"Planned {planned}; read back from the vehicle: {held}."
+            yield Anomaly(trial.number, "Different gains read back", sentence)
+        for glitch in trial.glitches:
+            yield Anomaly(trial.number, "Glitch in the record", glitch.sentence)
+        if trial.glitches and trial.repaired_error is not None:
+            repaired = f"Without the glitches the error would be {short(trial.repaired_error)} {error_unit}."
+            yield Anomaly(trial.number, "Glitch in the record", repaired)
+        if trial.flight is not None and trial.flight.problem and (trial.given_reason or not kind):
+            kind = _ENDINGS.get(trial.flight.state)
+            end = trial.flight.problem if kind is None else _end_beside(trial.flight.state, trial.flight.end)
+            yield Anomaly(trial.number, kind or "Vehicle problem", end)
+
+
+DAMAGED: Final = (
+    "The stored record does not match its checksum. The curve shown is the coarse copy made at landing, and the error "
+    "is the one computed then. Restore the record from an earlier backup."
+)
+
+
+def _end_beside(state: str, end: FlightEnd | None) -> str:
+    """How a flight ended, beside the word for its state."""
+    return "" if end is None else cause_text(end, "" if state == "aborted" else "aborted")
+
+
+def of_vehicle(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    acts: Iterable[VehicleAct],
+    ledger: Iterable[GivenGains],
+    trials: Iterable[Trial],
+) -> Iterator[Anomaly]:
+    """Safe gains that could not be verified after a flight, quarantine, and releases from it during the campaign."""
+    numbers = {trial.id: trial.number for trial in trials}
+    for line in ledger:
+        if line.purpose == "restore after flight" and line.campaign_id == campaign.id and line.outcome == "failed":
+            sentence = f"Safe gains {format_gains(line.asked)} were not read back after the flight."
+            flight = None if line.trial_id is None else numbers.get(line.trial_id)
+            yield Anomaly(flight, "Safe gains not verified", sentence)
+    if vehicle.state == "quarantined":
+        yield Anomaly(None, "Quarantine", f"{vehicle.name} is quarantined: {vehicle.concern}")
+    for act in acts:
+        if act.kind == "release" and campaign.created_at <= act.requested_at <= campaign.updated_at:
+            by = f" by {act.by}" if act.by else ""
+            yield Anomaly(None, "Quarantine", f"Released{by} during the campaign: {act.reason}")
+
+
+MAX_BYTES: Final = 24 * 2**20
+"""Limit for all photos together, in original size; they take a third more in the file."""
+
+
+def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
+    """Remarks of the trials that have any, in order."""
+    photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
+    for row, size in photos_of_campaign(session, campaign_id):
+        photos.setdefault(row.trial_id, []).append((row, size))
+    kept, room = set[int](), MAX_BYTES
+    turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
+    for _, photo_id, size in turns:  # the first photo of each trial comes before the second of any
+        if size <= room:
+            kept.add(photo_id)
+            room -= size
+    for trial in trials:
+        own = photos.get(trial.id, [])
+        if not trial.note and not own:
+            continue
+        shown = [Photo(row.media_type, row.data, row.added_at) for row, _ in own if row.id in kept]
+        yield Remark(trial=trial, photos=tuple(shown), left_out=len(own) - len(shown))
 
 
 def report_of(session: Session, campaign_id: int) -> Report:
@@ -39,29 +285,29 @@ def report_of(session: Session, campaign_id: int) -> Report:
     campaign = campaigns.get_campaign(session, campaign_id)
     statistics = campaign_statistics(session, campaign_id)
     trials = tuple(_all(lambda cursor: trials_service.list_trials(session, campaign_id, limit=_PAGE, cursor=cursor)))
-    experiment = experiment_of(campaign)
+    definition = campaign.definition
+    experiment = EXPERIMENTS[definition.experiment].configured(definition.experiment_options)
     vehicle = fleet.get_vehicle(session, campaign.vehicle.id)
+    frozen = campaigns.get_row(session, campaign_id).safe_gains
+    safe_gains = format_gains(vehicle.safe_gains)
+    if frozen is not None and frozen != vehicle.safe_gains:
+        safe_gains = f"{format_gains(frozen)} at the first flight, now {safe_gains}"
     past = figure_data.history_of(session, campaign_id, curves=True)
-    landscape = landscape_card(session, campaign_id, "light", stacked=True).card
+    landscape, _ = landscape_card(session, campaign_id, "light", stacked=True)
     return Report(
         campaign=campaign,
         statistics=statistics,
         trials=trials,
         experiment=experiment.title,
         gains=experiment.space.gains,
-        what=describe_vehicle(
-            campaign,
-            experiment,
-            vehicle.identity,
-            describe_safe_gains(campaigns.get_row(session, campaign_id).safe_gains, vehicle.safe_gains),
-        ),
-        how=describe_method(campaign, experiment),
+        what=tuple(describe_vehicle(campaign, experiment, vehicle.identity, safe_gains)),
+        how=tuple(describe_method(campaign, experiment)),
         cards=(
             *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
             *((landscape,) if landscape.state == "ready" else ()),  # only if it has been computed already
         ),
-        remarks=tuple(sections.remarks_on(session, campaign_id, trials)),
-        photo_bytes=sections.MAX_BYTES,
+        remarks=tuple(remarks_on(session, campaign_id, trials)),
+        photo_bytes=MAX_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
         version=__version__,
         made_at=utc_now(),
@@ -69,12 +315,12 @@ def report_of(session: Session, campaign_id: int) -> Report:
 
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
-    yield from sections.of_flights(trials, unit)
-    yield from (Anomaly(row.number, "Damaged record", sections.DAMAGED) for row in damaged_trials(session, campaign.id))
+    yield from of_flights(trials, unit)
+    yield from (Anomaly(row.number, "Damaged record", DAMAGED) for row in damaged_trials(session, campaign.id))
     if not campaign.vehicle.registered:
         return
     vehicle_id = campaign.vehicle.id
-    yield from sections.of_vehicle(
+    yield from of_vehicle(
         campaign,
         fleet.get_vehicle(session, vehicle_id),
         _all(lambda cursor: acts_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),

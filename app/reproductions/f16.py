@@ -25,6 +25,7 @@ from app.reproductions.f16_campaigns import (
     showcase,
     start,
     study,
+    true_errors,
     truth,
 )
 from app.reproductions.results import Progress, Result, Row, curve, marks, ratio
@@ -54,7 +55,6 @@ NOISY_FLIGHTS: Final = 5
 PROTOTYPE_NEAR: Final = 18.0
 """Flights until near the optimum in the prototype's showcase."""
 
-_UNIT: Final = "rad·s"
 _SEARCHES: Final = 4
 _STYLES: Final[tuple[Style, ...]] = ("run 1", "run 2", "run 3", "run 4", "run 5", "run 6")
 _FROM_SHOWCASE: Final = 0.05
@@ -102,7 +102,9 @@ def _definition() -> Iterator[Row]:
         ("error with the hand gains", space.default, 3.38180, 5),
         ("error of the true optimum within our bounds", _optimum(), BEST_ERROR, 6),
     ):
-        yield Row(group=group, label=label, unit=_UNIT, measured=_true_error(gains), reference=reference, digits=digits)
+        yield Row(
+            group=group, label=label, unit="rad·s", measured=true_errors([gains])[0], reference=reference, digits=digits
+        )
 
 
 def _optimum() -> Vector:
@@ -111,11 +113,6 @@ def _optimum() -> Vector:
     for _ in range(_SEARCHES):
         gains = model_optimum(truth(), PitchTracking.space, gains).gains
     return gains
-
-
-def _true_error(gains: Vector) -> float:
-    aircraft = truth()
-    return float(aircraft.errors(aircraft.outputs(gains[np.newaxis], aircraft.nominal_model))[0])
 
 
 def _showcase(shown: Showcase) -> Iterator[Row]:
@@ -156,7 +153,7 @@ def _starts(on_progress: Progress) -> Iterator[Row]:
     for perturbation, expected in EXPECTED_START.items():
         errors = []
         for seed in range(SEEDS):
-            errors.append(_true_error(start(perturbation, seed).gains))
+            errors.extend(true_errors([start(perturbation, seed).gains]))
             done += 1
             on_progress(_FROM_SHOWCASE + share * done, f"models' optima at ±{short_percent(perturbation)}, seed {seed}")
         yield Row(

@@ -32,7 +32,6 @@ SHOWCASE_PERTURBATION: Final = 0.45
 SHOWCASE_FLIGHTS: Final = 25
 PAPER_FLIGHTS: Final = 27
 PAPER_NEAR_OPTIMAL_AFTER: Final = 16
-_KEPT_STARTS: Final = 256
 
 Progress = Callable[[int, int], None]
 """Called with the number of campaigns done and their total."""
@@ -190,7 +189,7 @@ def truth() -> PitchTracking:
     return PitchTracking({"perturbation": 0.0})
 
 
-@lru_cache(maxsize=_KEPT_STARTS)
+@lru_cache(maxsize=256)
 def start(perturbation: float, seed: int) -> Optimum:
     """Start of every campaign on an inaccurate model: that model's optimum, searched from the hand gains."""
     experiment = PitchTracking({"perturbation": perturbation, "model_seed": seed})
@@ -202,7 +201,7 @@ def _campaign(method: Method, perturbation: float, seed: int, max_flights: int) 
         return _searched(start(perturbation, seed).gains)
     definition = _definition(method, perturbation, seed, max_flights)
     flights = list(_flown(definition, method, until_near=True))
-    return tuple(_true_errors([flight.gains for flight in flights]))
+    return tuple(true_errors([PitchTracking.space.vector(flight.gains) for flight in flights]))
 
 
 def _definition(method: Method, perturbation: float, seed: int, max_flights: int) -> Definition:
@@ -233,15 +232,14 @@ def _flown(definition: Definition, method: Method, *, until_near: bool) -> Itera
         record = whole_flight(proposal.gains, log_noise=method.log_noise, seed=seed).as_stored()
         flights.append(truth().scored_flight(number, proposal.gains, record))
         yield flights[-1]
-        if until_near and _true_errors([proposal.gains])[0] <= (1.0 + WITHIN) * BEST_ERROR:
+        if until_near and true_errors([truth().space.vector(proposal.gains)])[0] <= (1.0 + WITHIN) * BEST_ERROR:
             return
 
 
-def _true_errors(gains: Sequence[Mapping[str, float]]) -> list[float]:
-    """Noise-free errors on the true system, rad·s."""
+def true_errors(gains: Sequence[Vector]) -> list[float]:
+    """Noise-free errors of gain sets on the true system, rad·s."""
     aircraft = truth()
-    vectors = np.array([aircraft.space.vector(one) for one in gains])
-    return [float(error) for error in aircraft.errors(aircraft.outputs(vectors, aircraft.nominal_model))]
+    return [float(error) for error in aircraft.errors(aircraft.outputs(np.array(gains), aircraft.nominal_model))]
 
 
 class _NearError(Exception):
@@ -256,7 +254,7 @@ def _searched(first: Vector) -> Errors:
     errors: list[float] = []
 
     def fly(vector: Vector) -> float:
-        errors.extend(_true_errors([space.mapping(space.nearest(vector))]))
+        errors.extend(true_errors([space.nearest(vector)]))
         if errors[-1] <= (1.0 + WITHIN) * BEST_ERROR:
             raise _NearError
         return errors[-1]

@@ -8,7 +8,7 @@ from app.common.schemas import Page
 from app.figures.base import Card
 from app.jobs.service import Job
 from app.reproductions import service
-from app.reproductions.schemas import Reproduction, ReproductionSummary, Run
+from app.reproductions.service import Reproduction, ReproductionSummary, Run
 from app.web.dependencies import IdempotentPost, Reader, Theme, json_only
 
 router = APIRouter(prefix="/api/reproductions", tags=["reproductions"], dependencies=[Depends(json_only)])

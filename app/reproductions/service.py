@@ -1,12 +1,14 @@
 """Services for reproductions: request a run, read its result."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from datetime import datetime
+from typing import Annotated, Final
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 from sqlalchemy.orm import Session
 
 from app.common.errors import GainlineError, NotFoundError
+from app.common.schemas import Request, Schema
 from app.common.states import JobState
 from app.db.models import JobRow
 from app.figures.base import Card, card_of
@@ -14,9 +16,55 @@ from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
 from app.jobs.service import Job
-from app.reproductions import schemas
-from app.reproductions.registry import REPRODUCTIONS, Reproduction
-from app.reproductions.results import Result, result_from_json
+from app.reproductions.registry import REPRODUCTIONS
+from app.reproductions.registry import Reproduction as Entry
+from app.reproductions.results import Result, Row, result_from_json
+
+
+class Run(Request):
+    """How to run a reproduction."""
+
+    full: Annotated[bool, Field(description="the long version, if there is one")] = False
+
+
+class ReproductionFigure(Schema):
+    """A figure of a reproduction, and its title in the paper."""
+
+    name: str
+    title: str
+
+
+class LatestRun(Schema):
+    """The newest finished run; its job records when it was started."""
+
+    job_id: int
+    full: bool
+    finished_at: datetime
+    seconds: float
+
+
+class ReproductionSummary(Schema):
+    """One experiment, table or figure of the paper. `line` describes what is done here, `paper` what the paper shows.
+
+    `job` is the newest run that is queued or running, or that failed or was cancelled after the `latest` one.
+    """
+
+    name: str
+    title: str
+    line: str
+    paper: str
+    long_form: Annotated[str, Field(description="contents of the long version; empty if there is none")]
+    figures: list[ReproductionFigure]
+    job: Job | None
+    latest: LatestRun | None
+
+
+class Reproduction(ReproductionSummary):
+    """A reproduction with the rows of its newest result, empty before the first."""
+
+    rows: list[Row]
+    notes: list[str]
+
 
 REPRODUCTION_JOB: Final = "reproduction"
 ACTIVE_STATES: Final = (JobState.QUEUED, JobState.RUNNING)
@@ -47,16 +95,16 @@ def read_order(order: object) -> Order:
     return found
 
 
-def list_reproductions(session: Session) -> list[schemas.ReproductionSummary]:
+def list_reproductions(session: Session) -> list[ReproductionSummary]:
     """All reproductions, in the order of the registry, without their rows."""
-    return [schemas.ReproductionSummary.view_of(each, **_summary(session, each)) for each in REPRODUCTIONS.values()]
+    return [ReproductionSummary.view_of(each, **_summary(session, each)) for each in REPRODUCTIONS.values()]
 
 
-def get_reproduction(session: Session, name: str) -> schemas.Reproduction:
+def get_reproduction(session: Session, name: str) -> Reproduction:
     """One reproduction with the rows of its newest result. Raises NotFoundError."""
     each = _registered(name)
     result = _result(session, name)
-    return schemas.Reproduction.view_of(
+    return Reproduction.view_of(
         each,
         **_summary(session, each),
         rows=[] if result is None else list(result.rows),
@@ -85,13 +133,13 @@ def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> C
     return replace(card, name=figure_name, title=f"{title}: {card.title}")
 
 
-def _registered(name: str) -> Reproduction:
+def _registered(name: str) -> Entry:
     if name not in REPRODUCTIONS:
         raise NotFoundError("reproduction", name, hint=f"Available: {', '.join(REPRODUCTIONS)}.")
     return REPRODUCTIONS[name]
 
 
-def _summary(session: Session, each: Reproduction) -> dict[str, object]:
+def _summary(session: Session, each: Entry) -> dict[str, object]:
     """What the registry does not know of a reproduction."""
     latest = jobs.latest_result(session, REPRODUCTION_JOB, each.name)
     return {
@@ -101,7 +149,7 @@ def _summary(session: Session, each: Reproduction) -> dict[str, object]:
     }
 
 
-def _open_job(session: Session, each: Reproduction, latest: JobRow | None) -> Job | None:
+def _open_job(session: Session, each: Entry, latest: JobRow | None) -> Job | None:
     """The job to show beside the result: the current run, or a later one that failed or was cancelled."""
     if (row := jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, ACTIVE_STATES)) is None:
         row = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, CAME_TO_NOTHING)
@@ -110,10 +158,10 @@ def _open_job(session: Session, each: Reproduction, latest: JobRow | None) -> Jo
     return jobs.job_view(session, row)
 
 
-def _latest_run(row: JobRow) -> schemas.LatestRun | None:
+def _latest_run(row: JobRow) -> LatestRun | None:
     if row.started_at is None or row.finished_at is None:
         return None
-    return schemas.LatestRun(
+    return LatestRun(
         job_id=row.id,
         full=read_order(row.order).full,
         finished_at=row.finished_at,

@@ -215,7 +215,15 @@ def _plot(table: Table, shown: Sequence[Takeoff], *, default: bool) -> Plot:
                 y_range=height,
                 lines=(
                     *(
-                        _takeoff(f"Run {number}", style, flown, last_s)
+                        _until(
+                            f"Run {number}",
+                            style,
+                            flown.trajectory,
+                            flown.trajectory["altitude_m"],
+                            last_s,
+                            note=f"{gains_text(flown.gains.values())}: {flown.measured:.4f} m, published "
+                            f"{flown.published.paper:.4f} m",
+                        )
                         for number, (style, flown) in enumerate(zip(_RUNS, shown, strict=False), start=1)
                     ),
                     _until("Reference", "reference", first, first["reference_m"], last_s),
@@ -224,11 +232,6 @@ def _plot(table: Table, shown: Sequence[Takeoff], *, default: bool) -> Plot:
             ),
         ),
     )
-
-
-def _takeoff(name: str, style: Style, flown: Takeoff, last_s: float) -> Line:
-    note = f"{gains_text(flown.gains.values())}: {flown.measured:.4f} m, published {flown.published.paper:.4f} m"
-    return _until(name, style, flown.trajectory, flown.trajectory["altitude_m"], last_s, note=note)
 
 
 def _until(name: str, style: Style, flight: Trajectory, values: Samples, last_s: float, *, note: str = "") -> Line:

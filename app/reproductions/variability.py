@@ -30,7 +30,6 @@ FADE: Final = 0.005
 """Loss of thrust of the control experiment's battery from the first to the last flight, as a share."""
 CONFIDENCE: Final = 0.9
 SEED: Final = 1
-_NO_PRIOR: Final = Scatter(sd=0.0, degrees_of_freedom=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +40,6 @@ class RepeatedPolicy:
     gains: tuple[int, int, int]
     paper_sigma: float
     paper_error: float
-
-    @property
-    def named_gains(self) -> dict[str, float]:
-        return _named(self.gains)
 
 
 POLICIES: Final = (
@@ -122,7 +117,7 @@ def _named(gains: tuple[int, int, int]) -> dict[str, float]:
 
 
 def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable[[int], None]) -> Repeats:
-    overruled = overruled_for(policy.named_gains, "twin")
+    overruled = overruled_for(_named(policy.gains), "twin")
     flown: list[Vector] = []
     for group in range(groups + fading_groups):
         fade = FADE if group >= groups else 0.0
@@ -134,7 +129,7 @@ def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable
 def pooled_sigma(errors: Matrix) -> float:
     """σ in the errors' unit, pooled over the rows of (groups, repeats)."""
     groups = [Group(gains={}, numbers=(), errors=tuple(row)) for row in errors.tolist()]
-    return pool_scatter(groups, _NO_PRIOR).sigma
+    return pool_scatter(groups, prior=Scatter(sd=0.0, degrees_of_freedom=0.0)).sigma
 
 
 def share_with_trend(errors: Matrix) -> float:
@@ -154,7 +149,7 @@ def _rows(policy: RepeatedPolicy, flown: Repeats) -> Iterator[Row]:
         paper=policy.paper_error,
         ratio=ratio(mean, policy.paper_error),
         note="published: the one flight of Table 2",
-        gains=policy.named_gains,
+        gains=_named(policy.gains),
         overruled=flown.overruled,
     )
     yield _trend_row(policy, flown.steady)
@@ -188,7 +183,7 @@ def _sigma_row(policy: RepeatedPolicy, flown: Repeats) -> Row:
         paper=policy.paper_sigma,
         ratio=ratio(sigma, policy.paper_sigma),
         note=f"a single battery shows {low:.4f} … {high:.4f} m (5th to 95th of 100)",
-        gains=policy.named_gains,
+        gains=_named(policy.gains),
         overruled=flown.overruled,
     )
 

@@ -20,7 +20,7 @@ from app.campaigns.proposals import start_flying
 from app.campaigns.service import get_row
 from app.core.formatting import measured
 from app.db.session import Database
-from app.reports import pdf, router, sections
+from app.reports import pdf, router, service
 from tests.builders import (
     Json,
     create_ready_campaign,
@@ -163,7 +163,7 @@ def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_e
     first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     for trial in (first, first, first, third):
         add(client, trial, png())
-    monkeypatch.setattr(sections, "MAX_BYTES", 3 * len(png()) - 1)
+    monkeypatch.setattr(service, "MAX_BYTES", 3 * len(png()) - 1)
     page = read(client, campaign)
     assert [found["alt"] for tag, found in page.tags if tag == "img"] == [
         "Photo 1 of flight 1",

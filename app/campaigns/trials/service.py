@@ -1,11 +1,13 @@
 """Operations on trials for clients: people and scripts. The worker's side of a flight is in `app.flights.flight_rows`.
 
-Every gain set passes the gate before it becomes a trial; an operator may overrule some of its refusals.
+Every gain set passes the gate before it becomes a trial; an operator may overrule some of its refusals. What is
+predicted for a trial is kept with it, also for gains that no proposal contains.
 """
 
+import math
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Final
 
@@ -13,20 +15,22 @@ from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.autopilots.registry import experiment_of
+from app.autopilots.takeoffs import Takeoff
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
+from app.campaigns.flight_predictions import DatedPrediction, PredictorCache, predict_ahead, predict_planned
 from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.schemas import Campaign, Variant
 from app.campaigns.trials.schemas import Reopening, Trial, TrialEdit, TrialPlan
 from app.campaigns.trials.views import trial_view, trial_views
-from app.campaigns.variants import gains_of
 from app.common.conflict_checks import check_action, check_version
-from app.common.errors import ConflictError, InputError, Problem
+from app.common.errors import ConflictError, GainlineError, InputError, Problem, UnconfirmedError
 from app.common.schemas import Gate, Page
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.errors import TrajectoryError
+from app.core.formatting import EXACT_DIGITS, format_gains
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
@@ -61,8 +65,7 @@ def check_own_gains(
 
     Takes about 0.1 s. Raises GainsError that names what is refused and what would pass.
     """
-    gains, gate = gated_gains(session, campaign, asked)
-    return _judged(campaign, gains, gate, overrule)
+    return _judged(campaign, *gated_gains(session, campaign, asked), overrule)
 
 
 def evaluate_gate(session: Session, campaign_id: int, asked: Gains) -> Gate:
@@ -102,7 +105,6 @@ def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, ov
     return GateDecision(gains, proposals.gate_json(gate), reason)
 
 
-_BY_NUMBER: Final = Order("number", TrialRow.number.expression)
 KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repeat": "repeat", "baseline": "baseline"}
 
 
@@ -138,7 +140,8 @@ def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str |
     """List trials by number. Raises NotFoundError, or InputError for a cursor of another list."""
     campaign = campaigns.get_row(session, campaign_id)
     wanted, view = repository.trials_wanted(campaign_id), partial(trial_views, session, campaign)
-    return page_of(session, wanted, _BY_NUMBER, cursor=cursor, limit=limit, view=view)
+    by_number = Order("number", TrialRow.number.expression)
+    return page_of(session, wanted, by_number, cursor=cursor, limit=limit, view=view)
 
 
 def get_trial(session: Session, trial_id: int) -> Trial:
@@ -148,6 +151,26 @@ def get_trial(session: Session, trial_id: int) -> Trial:
 
 Predict = Callable[[Session, CampaignRow, Gains], Proposal | None]
 """What is predicted for gains that no proposal contains, with its curve in as many samples as are stored."""
+
+
+@dataclass(slots=True)
+class TrialPredictor:
+    """Predicts the trial of one request as the dashboard shows it."""
+
+    cache: PredictorCache
+    _ahead: DatedPrediction | None = field(default=None, init=False)
+
+    def prepare(self, session: Session, campaign_id: int, new: TrialPlan) -> None:
+        """Run the gate's simulations, whose results are kept, and predict the trial before the transaction of
+        `create_trial`. Problems with the trial are reported by `create_trial`."""
+        with suppress(GainlineError):
+            judged, _ = _chosen(session, campaigns.get_row(session, campaign_id), new)
+            if new.proposal_id is None:
+                self._ahead = predict_ahead(session, self.cache, campaign_id, judged.gains)
+
+    def predict(self, session: Session, campaign: CampaignRow, gains: Gains) -> Proposal | None:
+        """What is predicted for a trial with these gains, as it is stored with it."""
+        return predict_planned(session, campaign, gains, self._ahead)
 
 
 def create_trial(
@@ -210,12 +233,6 @@ def reopen_campaign(
     return campaigns.get_campaign(session, campaign_id)
 
 
-def find_gains(session: Session, campaign_id: int, new: TrialPlan) -> Gains:
-    """The gains that a new trial would fly. Raises as `create_trial` does for them."""
-    judged, _ = _chosen(session, campaigns.get_row(session, campaign_id), new)
-    return judged.gains
-
-
 def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     """Change a trial's note. Raises ConflictError when another client changed the trial first."""
     row = history.trial_row(session, trial_id)
@@ -245,7 +262,7 @@ def _chosen(session: Session, campaign: CampaignRow, new: TrialPlan) -> tuple[Ga
 
 def _of_variant(session: Session, campaign: CampaignRow, variant: Variant, shown: Gains | None) -> Gains:
     """The variant's gains. Raises ConflictError when they are not those that the client has shown."""
-    gains = gains_of(session, campaign, variant)
+    gains = proposals.variant_gains(session, campaign, variant)
     if shown is not None and dict(shown) != gains:
         raise ConflictError(
             f"The gains of the {variant} have changed since they were shown.",
@@ -259,3 +276,52 @@ def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: Propo
         return proposal.kind
     flown = history.in_history(history.trials_of(session, campaign.id))
     return "repeat" if any(row.gains == gains for row in flown) else "manual"
+
+
+_SINGLE_PRECISION: Final = 1e-6
+"""Logs store gains as single-precision numbers."""
+
+
+def settle_gains(session: Session, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
+    """Set the trial's gains to those in the log; a CSV file, which contains none, leaves them as planned.
+
+    Where the values differ and that is `confirmed`, the trial takes the gains that were flown and loses the prediction
+    for the planned ones. Raises InputError for a log with other gains than those of the experiment or without their
+    values, UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
+    """
+    if flown.gain_names and row.gains.keys() != set(flown.gain_names):
+        raise InputError(
+            f"The log has the gains {', '.join(flown.gain_names)}; this campaign tunes {', '.join(row.gains)}.",
+            hint="Upload it to a campaign whose experiment has these gains.",
+            problems=(Problem("file", "is a log of another autopilot"),),
+        )
+    if not flown.gain_names:
+        return
+    if not flown.gains:
+        raise InputError(
+            "The log does not say with which gains it was flown.",
+            hint="Choose a log with the vehicle's parameters: for Paparazzi's .data file add the .log file of the same "
+            "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file; it "
+            "is then taken as flown with the planned gains.",
+            problems=(Problem("file", f"does not contain values of {', '.join(row.gains)}"),),
+        )
+    if all(
+        math.isclose(value, flown.gains[name], rel_tol=_SINGLE_PRECISION, abs_tol=_SINGLE_PRECISION)
+        for name, value in row.gains.items()
+    ):
+        row.read_back = row.read_back or dict(row.gains)
+        return
+    if not confirmed:
+        held = format_gains(flown.gains, EXACT_DIGITS)
+        raise UnconfirmedError(
+            f"The log was flown with {held}, not with the planned {format_gains(row.gains, EXACT_DIGITS)}.",
+            hint="Choose the log of this flight, or confirm that the trial takes the gains in the log.",
+            problems=(Problem("confirm", f"the log was flown with {held}"),),
+        )
+    row.read_back = dict(flown.gains)
+    row.gains, gate = gated_gains(session, row.campaign, flown.gains)
+    row.gate, row.kind = proposals.gate_json(gate), "manual"
+    row.predicted_error = row.predicted_interval = None
+    if (curve := row.predicted) is not None:
+        row.predicted = None
+        session.delete(curve)

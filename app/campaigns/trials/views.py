@@ -1,28 +1,32 @@
-"""API views of trials, with the sentences that describe them and the comparison with the best before and the first,
-given the scatter of repeated flights.
+"""API views of trials and their records, with the sentences that describe them and the comparison with the best before
+and the first, given the scatter of repeated flights.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
+from pathlib import Path
 from typing import Final, Literal
 
+import numpy as np
 from sqlalchemy.orm import Session
 
 from app.autopilots.registry import get_experiment
-from app.campaigns import history
+from app.campaigns import history, repository
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.common.conflict_checks import allowed
+from app.common.data_folder import log_of_trial, telemetry_log
+from app.common.errors import NotFoundError
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
 from app.core.formatting import named_flights, percent, short
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
-from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
+from app.core.records.trajectory import CHANNEL_UNITS, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
 from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
@@ -36,14 +40,14 @@ CONFIDENCE: Final = 0.9
 class ReferenceFlights:
     """The valid flights that a campaign's trials are compared with, indexed for constant or logarithmic lookup.
 
-    `valid` are the flights in their order, `prior` is the experiment's scatter. `by_number` and `by_gains` hold all
-    flights with the gains of one.
+    `valid` are the flights in their order, `prior` is the experiment's scatter. `numbers` are
+    theirs; `by_number` and `by_gains` hold all flights with the gains of one.
     """
 
     def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
         groups = groups_of(valid)
         scored = [(flight.error, flight.number) for flight in valid if flight.error is not None]
-        self._numbers = [number for _, number in scored]
+        self.numbers: Final = [number for _, number in scored]
         self._best_so_far = list(accumulate(scored, min))
         self.by_number: Final[Mapping[int, Group]] = {number: group for group in groups for number in group.numbers}
         self.by_gains: Final[Mapping[object, Group]] = {_key(group.gains): group for group in groups}
@@ -51,12 +55,8 @@ class ReferenceFlights:
 
     def best_before(self, number: int) -> tuple[float, int] | None:
         """Error and number of the best flight before the given one."""
-        before = bisect_left(self._numbers, number)
+        before = bisect_left(self.numbers, number)
         return self._best_so_far[before - 1] if before else None
-
-    def first_before(self, number: int) -> int | None:
-        """Number of the first flight, if it is before the given one."""
-        return self._numbers[0] if self._numbers and self._numbers[0] < number else None
 
 
 def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
@@ -64,26 +64,19 @@ def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]
 
     Each side counts with all flights of its gains.
     """
-    own = field.by_number.get(row.number)
-    if own is None or field.scatter is None:
+    own, best = field.by_number.get(row.number), field.best_before(row.number)
+    if own is None or best is None or field.scatter is None:
         return []
+    others: dict[int, Literal["best before", "first"]] = {best[1]: "best before"}
+    others.setdefault(field.numbers[0], "first")
     found = []
-    for against, number in _others(row, field):
+    for number, against in others.items():
         other = field.by_number.get(number)
         if other is None or other.gains == own.gains:
             continue
         comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
         found.append(TrialComparison.view_of(comparison, against=against, trial_number=number))
     return found
-
-
-def _others(row: TrialRow, field: ReferenceFlights) -> Iterator[tuple[Literal["best before", "first"], int]]:
-    best, first = field.best_before(row.number), field.first_before(row.number)
-    if best is None or first is None:
-        return
-    yield "best before", best[1]
-    if first != best[1]:
-        yield "first", first
 
 
 def _key(gains: Gains) -> object:
@@ -104,8 +97,11 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     return [_view(row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
-def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
-    """View of a record, thinned to at most `points` samples such that the scored output keeps its peaks."""
+def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
+    """A trial's record, thinned to at most `points` samples such that the scored output keeps its peaks. Raises
+    NotFoundError when there is none, StorageError when it is damaged."""
+    row = history.trial_row(session, trial_id)
+    trajectory = history.record_of(session, row)
     assert row.trajectory is not None
     output = get_experiment(row.campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
@@ -122,20 +118,59 @@ def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> Traje
     )
 
 
+def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:
+    """File name, CSV and checksum of a full record: every sample with nine digits, which restore the stored
+    single-precision number exactly."""
+    row = history.trial_row(session, trial_id)
+    record = history.record_of(session, row)
+    assert row.trajectory is not None
+    table = np.column_stack([record.time_s, *record.channels.values()])
+    lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
+    name = f"campaign-{row.campaign_id}-trial-{row.number}.csv"
+    return name, "\n".join(lines) + "\n", row.trajectory.checksum
+
+
+def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
+    """Telemetry log of the trial's last flight that has one, else the one imported with the trial; and its name for
+    download.
+
+    Raises NotFoundError when there is none.
+    """
+    row = history.trial_row(session, trial_id)
+    flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
+    for file in (*flown, log_of_trial(data_dir, trial_id)):
+        if file.is_file():
+            return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"
+    raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")
+
+
 def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
     predicted_error, interval = _prediction(row, field)
+    same = field.by_gains.get(_key(row.gains))
+    again = [] if same is None else [number for number in same.numbers if number < row.number]
     return Trial.view_of(
         row,
         predicted_error=predicted_error,
         predicted_interval=interval,
-        inside_interval=_is_inside(interval, row),
-        group=_group(row, field),
+        inside_interval=None
+        if interval is None or row.error is None
+        else interval.lower <= row.error <= interval.upper,
+        group=None
+        if same is None or field.scatter is None
+        else GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size),
         comparisons=comparisons(row, field),
-        verdict=verdict(row, field, get_experiment(row.campaign.experiment).error_unit, _flown_before(row, field)),
+        verdict=verdict(row, field, get_experiment(row.campaign.experiment).error_unit, again),
         glitches=row.glitches or [],
         record=_record(row),
         may_be_valid=_may_be_valid(row),
-        flight=_flight(flight),
+        flight=None
+        if flight is None
+        else FlightBrief.view_of(
+            flight,
+            problem=end_text(flight.end),
+            standing_down=unstaged_text(Requester(flight.stand_down)) if flight.stand_down else "",
+            safe_gains_restored=None if flight.restored is None else flight.restored == flight.safe_gains,
+        ),
         speed=flight.speed if flight else None,
         settings=row.settings or {},
         reason=reason_of(row),
@@ -148,25 +183,6 @@ def _prediction(row: TrialRow, field: ReferenceFlights) -> tuple[float | None, I
     """The predicted error and its interval; both None if they said nothing."""
     is_corrected = field.best_before(row.number) is not None
     return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
-
-
-def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
-    if interval is None or row.error is None:
-        return None
-    return interval.lower <= row.error <= interval.upper
-
-
-def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
-    same = field.by_gains.get(_key(row.gains))
-    if same is None or field.scatter is None:
-        return None
-    return GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size)
-
-
-def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
-    """Numbers of the earlier flights with the gains of this trial."""
-    same = field.by_gains.get(_key(row.gains))
-    return [] if same is None else [number for number in same.numbers if number < row.number]
 
 
 def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
@@ -188,9 +204,10 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
         case TrialState.LOST:
             return _ended("Lost", row)
         case TrialState.CAPTURED:
-            reason = reason_of(row)
+            reason, found = reason_of(row), len(row.glitches or [])
+            glitches = f", with {found} {'glitch' if found == 1 else 'glitches'} in its record" if found else ""
             doubt = f"; the measurement is doubtful: {reason.removesuffix('.')}" if reason else ""
-            return f"Landed and recorded{_glitches(row)}{doubt}. Review the flight."
+            return f"Landed and recorded{glitches}{doubt}. Review the flight."
         case _:
             return ""
 
@@ -205,13 +222,6 @@ def _ended(word: str, row: TrialRow) -> str:
     if row.reason or row.end is None or row.end.request is None or is_worded(row.end.request):
         return f"{word}: {reason_of(row)}"
     return cause_text(row.end, word)
-
-
-def _glitches(row: TrialRow) -> str:
-    """Note of the glitches that a person has to look at before classifying the flight."""
-    if not row.glitches:
-        return ""
-    return f", with {len(row.glitches)} {'glitch' if len(row.glitches) == 1 else 'glitches'} in its record"
 
 
 def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
@@ -244,17 +254,6 @@ def _may_be_valid(row: TrialRow) -> bool:
 
 def _units(channels: Iterable[str]) -> dict[str, str]:
     return {name: CHANNEL_UNITS.get(name, "") for name in channels}
-
-
-def _flight(row: FlightRow | None) -> FlightBrief | None:
-    if row is None:
-        return None
-    return FlightBrief.view_of(
-        row,
-        problem=end_text(row.end),
-        standing_down=unstaged_text(Requester(row.stand_down)) if row.stand_down else "",
-        safe_gains_restored=None if row.restored is None else row.restored == row.safe_gains,
-    )
 
 
 def _actions(row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
