@@ -37,10 +37,8 @@ from app.log_analyses.router import router as log_analyses
 from app.reports.router import router as reports
 from app.reproductions.router import router as reproductions
 from app.web import errors, events, system
-from app.web.errors import describe
 from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware
 from app.web.origin import AccessMiddleware
-from app.web.unlock import unlock_router
 
 gc.freeze()
 gc.enable()
@@ -82,7 +80,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     own = (
         catalogue.router,
         system.router,
-        unlock_router,
         campaigns,
         trials,
         flights,
@@ -103,14 +100,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for router in own:
         app.include_router(router)
     errors.install(app)
-    describe(app)
-    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.problem_response)
-    app.add_middleware(
-        AccessMiddleware,
-        host=settings.host,
-        refuse_foreign=errors.foreign_request_response,
-        refuse=errors.problem_response,
-    )
+    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes)
+    app.add_middleware(AccessMiddleware)
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=COMPRESSION)
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():
