@@ -27,8 +27,15 @@ from app.db.types import JsonObject, utc_now
 from app.fleet import repository
 from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import Vehicle, VehicleAct
-from app.fleet.service import hold_gains, require_idle, set_vehicle_state
-from app.fleet.views import act_view, is_linked_or_wanted, settings_of, vehicle_view
+from app.fleet.service import (
+    hold_gains,
+    is_linked_or_wanted,
+    require_idle,
+    set_vehicle_state,
+    settings_of,
+    vehicle_view,
+)
+from app.fleet.views import act_view
 from app.vehicles.base import CheckItem, Identity, LinkedVehicle
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
@@ -174,12 +181,10 @@ def finish_connect(
     record_connected(session, task.vehicle.vehicle_id, identity, concern=concern, held=held)
 
 
-def withdraw_acts(session: Session) -> list[int]:
-    """End all requested and running acts at a worker's start; they are not carried out later. Returns their ids."""
-    found = repository.acts_under_way(session)
-    for act in found:
+def withdraw_acts(session: Session) -> None:
+    """End all requested and running acts at a worker's start; they are not carried out later."""
+    for act in repository.acts_under_way(session):
         _end(act, problem=f"{_WITHDRAWN[act.state]} Request it again if it is still needed.")
-    return [act.id for act in found]
 
 
 def forget_connections(session: Session) -> None:
@@ -213,7 +218,7 @@ def record_reconnected(
 
     Returns False, and leaves the vehicle disconnected, if it is no longer wanted connected or was deleted.
     """
-    row = repository.one_or_none(session, vehicle_id)
+    row = session.get(VehicleRow, vehicle_id)
     if row is None or not row.wanted_connected:
         return False
     read_back = dict(held) or None

@@ -23,8 +23,13 @@ from app.db.models import VehicleRow
 from app.fleet import repository
 from app.fleet.control import record_act, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
-from app.fleet.service import require_idle
-from app.fleet.views import is_linked_or_wanted, is_registered_one_by_one, settings_of, vehicle_view
+from app.fleet.service import (
+    is_linked_or_wanted,
+    is_registered_one_by_one,
+    require_idle,
+    settings_of,
+    vehicle_view,
+)
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import IMPORT, VEHICLE_KINDS, get_kind
 
@@ -132,12 +137,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
     vehicle.
     """
     row = repository.get_one(session, vehicle_id)
-    check_version(edit.version, row.version, row.name, _differences(row, edit))
-    _require_own(row)
-    require_may_command(row, context)
-    check_action(VEHICLE_ACTIONS, "edit", row.state, row.name)
-    require_idle(session, row)
-    by = require_not_controlled_by_other(row, context)
+    by = _require_editable(session, row, edit.version, _differences(row, edit), context)
     if edit.options is not None:
         _set_options(session, row, edit.options, context, by=by)
     if edit.safe_gains is not None:
@@ -180,13 +180,26 @@ def promote_gains(
     session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, context: RequestContext
 ) -> None:
     """Make flown gains the safe gains. Raises ConflictError as `edit_vehicle` does."""
-    check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
+    by = _require_editable(session, row, version, {"safe_gains": (row.safe_gains, dict(gains))}, context)
+    _set_safe_gains(session, row, gains, statement=reason, by=by)
+    row.version += 1
+
+
+def _require_editable(
+    session: Session,
+    row: VehicleRow,
+    version: int,
+    differences: Mapping[str, tuple[object, object]],
+    context: RequestContext,
+) -> str:
+    """Return the operator of a change of a registered vehicle, as last read in that version. Raises ConflictError,
+    BusyError or NotAllowedError as `edit_vehicle` does."""
+    check_version(version, row.version, row.name, differences)
     _require_own(row)
     require_may_command(row, context)
     check_action(VEHICLE_ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
-    _set_safe_gains(session, row, gains, statement=reason, by=require_not_controlled_by_other(row, context))
-    row.version += 1
+    return require_not_controlled_by_other(row, context)
 
 
 def _require_own(row: VehicleRow) -> None:
