@@ -7,7 +7,7 @@ are dropped when the worker does not read them, so that a flight never waits for
 import os
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import Final
@@ -30,14 +30,16 @@ from app.flights.process_messages import (
     ConnectionRequest,
     FlightRequest,
     SafeGainsRestored,
+    Staging,
     StagingLost,
     TakeOffCommand,
     ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
+    is_silent,
+    status_of,
 )
-from app.flights.vehicle_status import Staging, is_silent, status_of
 from app.live.messages import SILENT_AFTER_S, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
@@ -73,17 +75,12 @@ def run_connection_process(pipe: Connection, call: ConnectionRequest) -> None:
     ignore_stop_signals()
     line = WorkerPipe(pipe)
     try:
-        with hold_vehicle_lock(
-            vehicle_lock(call.data_dir, call.vehicle.vehicle_id),
-            within_s=LOCK_TIMEOUT_S,
-            wanted=line.is_open,
-            clock=call.clock,
+        lock = vehicle_lock(call.data_dir, call.vehicle.vehicle_id)
+        with (
+            hold_vehicle_lock(lock, within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock),
+            closing(VehicleProcess(line, call)) as process,
         ):
-            process = VehicleProcess(line, call)
-            try:
-                process.run()
-            finally:
-                process.close()
+            process.run()
     except PipeClosedError:
         pass
     except GainlineError as error:
@@ -159,8 +156,11 @@ class VehicleProcess(FlightLoop):
         return connect(it.options, it.safe_gains, folder, it.identity, self._while_waiting, it.was_flying)
 
     def _next(self) -> ToVehicleProcess:
-        """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
-        while (message := self._poll_commands()) is None:
+        """Return the worker's next message that is not a command, which is forwarded at once; attend to the vehicle
+        meanwhile."""
+        while (message := self._line.receive()) is None or isinstance(message, VehicleCommand):
+            if message is not None:
+                self._forward_command(message)
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             if (status := self._publish_status()) is not None and self._staging in {"staged", "silent"}:
                 self._watch_staged(status)
@@ -192,14 +192,6 @@ class VehicleProcess(FlightLoop):
             except VehicleError as error:
                 self._staging = "lost"
                 self._line.send(StagingLost(str(error)))
-
-    def _poll_commands(self) -> ToVehicleProcess | None:
-        """Forward a command at once; return any other message."""
-        message = self._line.receive()
-        if not isinstance(message, VehicleCommand):
-            return message
-        self._forward_command(message)
-        return None
 
     def _while_waiting(self) -> None:
         """Callback of slow operations on the ground: forwards a command at once, which interrupts the operation.
@@ -246,7 +238,7 @@ class VehicleProcess(FlightLoop):
     def _report(self, ordered: VehicleCommand, problem: str = "") -> None:
         """Report a command that was forwarded to the vehicle, which must confirm that its motors have stopped."""
         is_awaited = ordered.order == "motors off" and not problem
-        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, problem, is_awaited)
+        forwarded = CommandForwarded(ordered, problem, is_awaited)
         self._line.send(forwarded)
         self._stops += [forwarded] * is_awaited
 
@@ -280,10 +272,9 @@ class VehicleProcess(FlightLoop):
                 )
             self._require_safe_gains(asked.safe_gains)
             with self._interruptible():
-                answer = self._perform(asked.kind)
+                return self._perform(asked.kind)
         except VehicleError as error:
             return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
-        return answer
 
     def _perform(self, kind: ActKind) -> VehicleResponse:
         checks, parameters = None, None

@@ -9,7 +9,7 @@ import os
 import select
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -138,7 +138,9 @@ class FlightLoop(ABC):
         self._trial_id, self._stop = request.trial_id, None
         try:
             with self._vehicle_for(request) as vehicle:
-                self._line.send(GainsStaged(self._stage(vehicle, request.gains)))
+                with self._interruptible():
+                    read_back = vehicle.stage(request.gains)
+                self._line.send(GainsStaged(read_back))
                 if (cleared := self._await_takeoff_clearance()) is not None:
                     self._line.send(FlightLanded(self._take_off(vehicle, request, cleared)))
         except GainlineError as error:
@@ -150,10 +152,6 @@ class FlightLoop(ABC):
         finally:
             self._trial_id = None
         self._line.send(FlightFinished())
-
-    def _stage(self, vehicle: Vehicle, gains: Mapping[str, float]) -> dict[str, float]:
-        with self._interruptible():
-            return vehicle.stage(gains)
 
     def _interruptible(self) -> AbstractContextManager[None]:
         """Context that a command for the vehicle interrupts; a simulation gets none."""
@@ -278,8 +276,7 @@ class FlightMonitor:
     """
 
     def __init__(self, request: FlightRequest, show: Callable[[Telemetry], None], clock: Clock) -> None:
-        self._campaign_id = request.campaign_id
-        self._trial_id = request.trial_id
+        self._request = request
         self._experiment = request.configured_experiment
         self._columns: list[str] = []
         self._scored_from_s = self._experiment.scored_from_s
@@ -312,8 +309,8 @@ class FlightMonitor:
             rows, self._rows = self._rows, []
             self._show(
                 Telemetry(
-                    campaign_id=self._campaign_id,
-                    trial_id=self._trial_id,
+                    campaign_id=self._request.campaign_id,
+                    trial_id=self._request.trial_id,
                     time_s=rows[-1][0],
                     columns=self._columns,
                     samples=rows,

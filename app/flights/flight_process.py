@@ -45,8 +45,8 @@ from app.flights.process_messages import (
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
+    status_time,
 )
-from app.flights.vehicle_status import status_time
 from app.live.messages import NO_LINK, SILENT_AFTER_S, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
 from app.vehicles.base import SafeGainsError, VehicleError
@@ -248,10 +248,11 @@ class VehicleConnection(FlightProcess):
             answer.set_result(problem)
 
     def _note_forwarded(self, forwarded: CommandForwarded) -> None:
-        self._answer_order(forwarded.number, forwarded.problem)
-        self._awaited[forwarded.number] = forwarded
+        number = forwarded.command.number
+        self._answer_order(number, forwarded.problem)
+        self._awaited[number] = forwarded
         if not forwarded.is_awaited:
-            self._hear_of(self._awaited.pop(forwarded.number))
+            self._hear_of(self._awaited.pop(number))
 
     def _end_orders(self) -> None:
         for number in tuple(self._orders):

@@ -19,7 +19,7 @@ from app.common.errors import StorageError
 from app.core.records.trajectory import Trajectory
 from app.db.earlier_ends import landing_of, read_end
 from app.db.types import FLIGHT_END
-from app.vehicles.base import Ending, FlightRecord, OptionValue
+from app.vehicles.base import FlightRecord
 
 RESERVED_BYTES: Final = 4 * 2**20
 """Reserved before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
@@ -133,13 +133,11 @@ def _unpack(content: bytes) -> FlightRecord:
     header = json.loads(line)
     time_s, *values = np.load(io.BytesIO(table), allow_pickle=False)
     channels = dict(zip(header["channels"], values, strict=True))
-    ending: Ending = header["ending"]
-    settings: dict[str, OptionValue] = header["settings"]
     return FlightRecord(
         trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
-        ending=ending,
+        ending=header["ending"],
         end=FLIGHT_END.validate_python(header["end"] if "end" in header else _earlier_end(header)),
-        settings=settings,
+        settings=header["settings"],
     )
 
 

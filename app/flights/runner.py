@@ -16,7 +16,6 @@ from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
 from app.db.session import RETRY_S
 from app.flights import flight_rows
-from app.flights.abort import AbortFlag
 from app.flights.flight_process import FlightProcess, FlightProcessPool, VehicleConnection
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
@@ -27,7 +26,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
-from app.flights.worker_part import WorkerPart
+from app.flights.worker_part import AbortFlag, WorkerPart
 from app.live.messages import FlightPhase, Phase
 from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.end_texts import end_text

@@ -35,10 +35,9 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import RETRY_S, Database, retry_until_stored
-from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
-from app.flights.worker_part import WorkerPart
+from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
@@ -80,10 +79,8 @@ def run_worker(settings: Settings) -> None:
     Raises AlreadyRunningError when another worker uses this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
-    abort_registry, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     try:
-        _run(settings, ending, abort_registry, keep_waiting=lambda: False)
+        _run(settings, ShutdownRequest(), (signal.SIGINT, signal.SIGTERM), keep_waiting=lambda: False)
     except LockedError as error:
         raise AlreadyRunningError(
             f"Another Gainline worker ({error.holder or 'its process is unknown'}) already uses "
@@ -98,16 +95,21 @@ def run_supervised_worker(settings: Settings) -> None:
 
     It waits while an older worker ends, and ends with its parent once its flights are over.
     """
-    abort_registry, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGTERM, ending=ending, abort_registry=abort_registry)
+    ending = ShutdownRequest()
     threading.Thread(target=_shut_down_with_parent, args=(ending,), daemon=True).start()
     with suppress(LockedError):  # stopped while it waited for the lock
-        _run(settings, ending, abort_registry, keep_waiting=lambda: not ending.event.is_set())
+        _run(settings, ending, (signal.SIGTERM,), keep_waiting=lambda: not ending.event.is_set())
 
 
 def _run(
-    settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, *, keep_waiting: Callable[[], bool]
+    settings: Settings,
+    ending: ShutdownRequest,
+    signals: Sequence[signal.Signals],
+    *,
+    keep_waiting: Callable[[], bool],
 ) -> None:
+    abort_registry = AbortRegistry()
+    _install_signal_handlers(signals, ending, abort_registry)
     prepare_data_dir(settings.data_dir)
     narrowed = make_private(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
@@ -119,7 +121,9 @@ def _run(
         Worker(settings, ending, abort_registry).work()
 
 
-def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, abort_registry: AbortRegistry) -> None:
+def _install_signal_handlers(
+    signals: Sequence[signal.Signals], ending: ShutdownRequest, abort_registry: AbortRegistry
+) -> None:
     """Install signal handlers that only queue the request, because the interrupted thread may hold any lock; a separate
     thread handles it."""
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()

@@ -16,7 +16,6 @@ from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow, VehicleRow
 from app.db.session import Database
 from app.fleet.service import hold_gains
-from app.flights.abort import AbortRegistry
 from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import (
     FlightFailure,
@@ -27,7 +26,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.runner import FlightRunner
-from app.flights.worker_part import WorkerPart
+from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.live.messages import FlightPhase, PublishedMessage
 from app.vehicles.end_texts import end_text
 from app.vehicles.flight_end import StopRequest, withdrawn_by
