@@ -25,7 +25,6 @@ from app.common.errors import StorageError
 
 LINK_VALID_S: Final = 15 * 60
 _SECRET_BYTES: Final = 32
-_GIVEN_BY_PLACE: Final = {RequestOrigin.HERE: Key.BROWSER, RequestOrigin.ELSEWHERE: Key.REMOTE}
 
 
 class Keyring:
@@ -61,7 +60,7 @@ class Keyring:
 
     def given_to(self, place: RequestOrigin) -> Key:
         """The key that a browser at that place gets for a link."""
-        return _GIVEN_BY_PLACE[place]
+        return Key.BROWSER if place is RequestOrigin.HERE else Key.REMOTE
 
     def key_of(self, shown: str) -> Key:
         """The key that this value presents; `Key.NONE` for any other value."""

@@ -76,7 +76,7 @@ class JobRunner:
         with self.database.write() as session:
             for job_id in tuple(self._at_work):
                 jobs.heartbeat_job(session, job_id, worker=self.worker, lease_s=self.lease_s)
-            jobs.requeue_expired_jobs(session)
+            jobs.requeue_running_jobs(session, expired=True)
 
     def carry_out(self, job: ClaimedJob) -> None:
         """Carry out a job, from the stored order to the stored result. Raises nothing."""

@@ -270,10 +270,6 @@ class Live:
         )
 
     @property
-    def worker_running(self) -> bool:
-        return self.client.connected
-
-    @property
     def worker(self) -> Literal["running", "not answering", "absent"]:
         if not self.client.connected:
             return "absent"

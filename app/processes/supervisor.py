@@ -32,7 +32,6 @@ class Supervisor(Generic[T]):
         self._argument = argument
         self._name = name
         self._stopping = threading.Event()
-        self._process: BaseProcess | None = None
         self._thread = threading.Thread(target=self._watch, name=f"{name} supervisor", daemon=True)
 
     def __enter__(self) -> Self:
@@ -44,8 +43,6 @@ class Supervisor(Generic[T]):
         self._stopping.set()
         self._thread.join()
         process = self._process
-        if process is None:
-            return
         if process.is_alive():
             process.terminate()
         try:
@@ -68,7 +65,6 @@ class Supervisor(Generic[T]):
         started_s = time.monotonic()
         while not self._stopping.is_set():
             process = self._process
-            assert process is not None
             process.join(0.1)
             if process.is_alive() or self._stopping.is_set():
                 continue
