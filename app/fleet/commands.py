@@ -20,7 +20,6 @@ from app.accounts.permissions import Permission, RequestContext
 from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
-from app.core.policy import Gains
 from app.db.base import added
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.types import JsonObject, utc_now
@@ -118,15 +117,17 @@ def _requested(
 
 
 def _add(session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: str = "") -> VehicleActRow:
-    act = VehicleActRow(
-        vehicle_id=row.id,
-        kind=kind,
-        state=ActState.REQUESTED,
-        by=by,
-        reason=reason,
-        asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
+    return added(
+        session,
+        VehicleActRow(
+            vehicle_id=row.id,
+            kind=kind,
+            state=ActState.REQUESTED,
+            by=by,
+            reason=reason,
+            asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
+        ),
     )
-    return added(session, act)
 
 
 def claim_act(session: Session, worker: str) -> ActTask | None:
@@ -247,13 +248,13 @@ def record_connected(
     the vehicle that answers now.
     """
     row = repository.get_one(session, vehicle_id)
-    row.concern = concern or row.concern
+    known = concern or row.concern
     row.checks = row.checked_at = None
     if not concern:
         _pin(row, identity)
     if held is not None:
         hold_gains(row, held)
-    _move_to(row, VehicleState.QUARANTINED if row.concern else VehicleState.READY)
+    _move_to(row, VehicleState.QUARANTINED if known else VehicleState.READY, known)
 
 
 def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
@@ -264,25 +265,22 @@ def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
 def record_disconnected(session: Session, vehicle_id: int, *, concern: str = "") -> None:
     """Record a closed link. A concern is kept: the vehicle is quarantined when it is connected again."""
     row = repository.get_one(session, vehicle_id)
-    row.concern = concern or row.concern
-    _move_to(row, VehicleState.DISCONNECTED)
+    _move_to(row, VehicleState.DISCONNECTED, concern or row.concern)
 
 
 def quarantine_vehicle(session: Session, vehicle_id: int, concern: str) -> None:
     """Quarantine the vehicle; `concern` says what could not be verified."""
     row = repository.get_one(session, vehicle_id)
-    row.concern = concern
-    _move_to(row, VehicleState.QUARANTINED)
+    _move_to(row, VehicleState.QUARANTINED, concern)
 
 
 def record_released(session: Session, vehicle_id: int, *, identity: Identity | None = None) -> None:
     """End the quarantine. `identity`: the identity that answers now, which the person has accepted."""
     row = repository.get_one(session, vehicle_id)
-    row.concern = ""
     row.checks = row.checked_at = None
     if identity is not None:
         row.identity = asdict(identity)
-    _move_to(row, VehicleState.READY)
+    _move_to(row, VehicleState.READY, "")
 
 
 def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]) -> None:
@@ -318,7 +316,7 @@ def _linked(session: Session, row: VehicleRow) -> LinkedVehicle:
     )
 
 
-def _was_given(row: VehicleRow, read_back: Gains | None) -> bool:
+def _was_given(row: VehicleRow, read_back: Mapping[str, float] | None) -> bool:
     """Whether connecting wrote the safe gains; on a vehicle that is armed, absent or not pinned nothing is written."""
     return row.identity is not None and read_back is not None
 
@@ -333,7 +331,8 @@ def _pin(row: VehicleRow, identity: Identity) -> None:
     row.identity = asdict(identity if pinned is None else pinned.completed_by(identity))
 
 
-def _move_to(row: VehicleRow, state: VehicleState) -> None:
+def _move_to(row: VehicleRow, state: VehicleState, concern: str) -> None:
+    row.concern = concern
     if row.state != state:
         set_vehicle_state(row, state)
 

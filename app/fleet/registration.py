@@ -12,10 +12,9 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import Permission, RequestContext, require
 from app.autopilots.experiments import get_experiment
 from app.common.conflict_checks import check_action, check_version
-from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
+from app.common.errors import ConflictError, GainlineError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
-from app.core.errors import GainlineError
 from app.core.formatting import EXACT_DIGITS, format_gains, setting_text
 from app.core.policy import PolicySpace
 from app.db.base import added
@@ -65,17 +64,19 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
         with _noting(refused):
             _require_confirmed(new, gains)
     _raise_all(refused)
-    row = VehicleRow(
-        kind=kind.name,
-        name=new.name,
-        title=kind.title,
-        is_real=is_real,
-        registered=True,
-        options=options,
-        safe_gains=gains,
-        state=VehicleState.DISCONNECTED,
+    row = added(
+        session,
+        VehicleRow(
+            kind=kind.name,
+            name=new.name,
+            title=kind.title,
+            is_real=is_real,
+            registered=True,
+            options=options,
+            safe_gains=gains,
+            state=VehicleState.DISCONNECTED,
+        ),
     )
-    added(session, row)
     record_act(session, row, ActKind.SAFE_GAINS, by="", reason=new.statement or "registered", asked=gains)
     return vehicle_view(row)
 
@@ -323,16 +324,18 @@ def get_or_create_imported_vehicle(
         called = f"{name[:_ROOM]} (elsewhere{'' if number == 1 else f', {number}'})"
         known = repository.of_name_or_none(session, called)
         if known is None:
-            row = VehicleRow(
-                kind=IMPORT.name,
-                name=called,
-                title=IMPORT.title,
-                is_real=is_real,
-                options=origin,
-                safe_gains=dict(safe_gains),
-                state=VehicleState.DISCONNECTED,
+            return added(
+                session,
+                VehicleRow(
+                    kind=IMPORT.name,
+                    name=called,
+                    title=IMPORT.title,
+                    is_real=is_real,
+                    options=origin,
+                    safe_gains=dict(safe_gains),
+                    state=VehicleState.DISCONNECTED,
+                ),
             )
-            return added(session, row)
         if (known.kind, known.registered, known.is_real, known.options) == (IMPORT.name, False, is_real, origin):
             return known
     raise AssertionError("unreachable")

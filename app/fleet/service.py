@@ -77,15 +77,17 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         raise _no_choice("id", "is missing: a vehicle of this kind must be registered first")
     if (known := repository.shared_of_kind_or_none(session, choice.kind)) is not None:
         return known
-    row = VehicleRow(
-        kind=choice.kind,
-        name=described.title,
-        title=described.title,
-        is_real=described.is_real,
-        safe_gains=dict(default_gains),
-        state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
+    return added(
+        session,
+        VehicleRow(
+            kind=choice.kind,
+            name=described.title,
+            title=described.title,
+            is_real=described.is_real,
+            safe_gains=dict(default_gains),
+            state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
+        ),
     )
-    return added(session, row)
 
 
 def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, default_gains: Gains) -> VehicleRow:
@@ -228,9 +230,11 @@ def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
 
 
 def doubt_gains(row: VehicleRow) -> None:
-    """Quarantine a vehicle after a flight that ended without a report of its gains."""
-    row.held = row.held_at = None
-    set_state_after_flight(row, concern=_GAINS_NOT_READ_BACK)
+    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored. A
+    simulated vehicle starts afresh with every flight."""
+    if row.is_real:
+        row.held = row.held_at = None
+        set_state_after_flight(row, concern=_GAINS_NOT_READ_BACK)
 
 
 def is_classed_automatically(row: VehicleRow) -> bool:

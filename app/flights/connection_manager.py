@@ -14,10 +14,9 @@ from typing import Final, TypeVar
 import structlog
 from sqlalchemy.orm import Session as Transaction
 
-from app.common.errors import ConflictError, StorageError
+from app.common.errors import ConflictError, GainlineError, StorageError
 from app.common.logging import say
 from app.common.states import GIVES_GAINS, ActKind
-from app.core.errors import GainlineError
 from app.fleet import commands
 from app.fleet.commands import ActTask
 from app.flights.connection_process import run_connection_process

@@ -91,10 +91,6 @@ class FlightProcess:
     def alive(self) -> bool:
         return self._child.alive
 
-    @property
-    def pid(self) -> int | None:
-        return self._child.pid
-
     def fly(self, request: FlightRequest, publish: Publish) -> Iterator[FlightMessage]:
         """Send the request, publish telemetry and phases, and yield the other messages until the process is free again.
 
@@ -139,7 +135,7 @@ class FlightProcess:
     def _post(self, message: ToVehicleProcess) -> bool:
         try:
             with self._sending:
-                self._child.send(message)
+                self._child.pipe.send(message)
         except OSError:  # the process is dead: `_next` says so
             return False
         return True

@@ -119,19 +119,21 @@ def _first_requested(session: Session) -> FlightRow | None:
 def add_flight(session: Session, trial_id: int, *, mode: FlightMode, speed: float | None) -> FlightRow:
     """Add the request that a vehicle flies a trial's gains, with the label of its battery. Raises NotFoundError."""
     trial, now = trial_row(session, trial_id), utc_now()
-    flight = FlightRow(
-        campaign_id=trial.campaign_id,
-        trial_id=trial_id,
-        vehicle_id=trial.campaign.vehicle_id,
-        state=FlightState.REQUESTED,
-        mode=mode,
-        gains=trial.gains,
-        speed=speed,
-        battery=trial.campaign.vehicle.battery,
-        requested_at=now,
-        take_off_at=now if mode == "fly" else None,
+    return added(
+        session,
+        FlightRow(
+            campaign_id=trial.campaign_id,
+            trial_id=trial_id,
+            vehicle_id=trial.campaign.vehicle_id,
+            state=FlightState.REQUESTED,
+            mode=mode,
+            gains=trial.gains,
+            speed=speed,
+            battery=trial.campaign.vehicle.battery,
+            requested_at=now,
+            take_off_at=now if mode == "fly" else None,
+        ),
     )
-    return added(session, flight)
 
 
 def claim_flight(session: Session, worker: str) -> FlightRequest | None:
@@ -325,7 +327,7 @@ def _lose(session: Session, flight: FlightRow, end: FlightEnd) -> None:
     set_trial_state(flight.trial, TrialState.LOST, reason="")
     flight.trial.end = end
     _end(flight, FlightState.LOST, end)
-    _doubt_vehicle(flight)
+    fleet.doubt_gains(flight.vehicle)
     proposals.finish_flying(session, flight.campaign)
 
 
@@ -347,7 +349,7 @@ def _give_up(session: Session, flight: FlightRow, problem: str) -> bool:
             _lose(session, flight, FlightEnd(remarks=(problem,), landed=Landing.UNKNOWN))
         else:
             _end_unflown(session, flight, FlightState.FAILED, not_begun(problem))
-    _doubt_vehicle(flight)
+    fleet.doubt_gains(flight.vehicle)
     return lifted_off
 
 
@@ -355,15 +357,6 @@ def _record_doubts(flight: FlightRow, outcome: FlightOutcome) -> None:
     if outcome.concern:
         fleet.set_state_after_flight(flight.vehicle, concern=outcome.concern)
     elif outcome.unheard:
-        _doubt_vehicle(flight)
-
-
-def _doubt_vehicle(flight: FlightRow) -> None:
-    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored.
-
-    A simulated vehicle starts afresh with every flight.
-    """
-    if flight.vehicle.is_real:
         fleet.doubt_gains(flight.vehicle)
 
 

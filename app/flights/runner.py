@@ -28,7 +28,7 @@ from app.flights.process_messages import (
 from app.flights.record_spool import Spool
 from app.flights.worker_part import AbortFlag, WorkerPart
 from app.live.messages import FlightPhase, Phase
-from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
+from app.vehicles.base import FlightRecord, find_mismatch
 from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind
 
@@ -39,10 +39,6 @@ POLL_INTERVAL_S: Final = 0.05
 _log = structlog.get_logger(__name__)
 
 
-def _refuse_session(_vehicle_id: int) -> FlightProcess:
-    raise VehicleError("There is no link to the vehicle.", hint="Connect it, then try again.")
-
-
 class FlightRunner:
     """Claims flights and carries them out.
 
@@ -50,7 +46,7 @@ class FlightRunner:
     opened for each flight in a process of the pool.
     """
 
-    def __init__(self, part: WorkerPart, *, session: Callable[[int], FlightProcess] = _refuse_session) -> None:
+    def __init__(self, part: WorkerPart, *, session: Callable[[int], FlightProcess]) -> None:
         self._part = part
         self._session = session
         self._spool = Spool(part.data_dir / "spool")

@@ -10,13 +10,11 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import LOCAL_CLI, RequestContext, RequestOrigin
 from app.campaigns import history, rehearsals
 from app.campaigns.definitions import experiment_of_campaign
-from app.campaigns.history import set_flight_state
 from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, Trial
-from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action
-from app.common.errors import ConflictError, NotAllowedError
+from app.common.errors import ConflictError, GainlineError, NotAllowedError
 from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     HISTORY_TRIAL_STATES,
@@ -26,7 +24,6 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
-from app.core.errors import GainlineError
 from app.db.models import FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
@@ -54,7 +51,7 @@ def warm_gate_cache(session: Session, trial_id: int) -> None:
     """Run the gate's simulations before the transaction of `fly_trial` needs the results."""
     with suppress(GainlineError):
         row = history.trial_row(session, trial_id)
-        check_own_gains(session, row.campaign, row.gains)
+        trials.check_own_gains(session, row.campaign, row.gains)
 
 
 def fly_new_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext = LOCAL_CLI) -> Trial:
@@ -79,7 +76,7 @@ def fly_trial(
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, mode, row.state, f"Flight {row.number}")
     trials.require_open(session, row.campaign, HISTORY_TRIAL_STATES)
-    judged = check_own_gains(session, row.campaign, row.gains, overrule=row.overrule_reason or None)
+    judged = trials.check_own_gains(session, row.campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
     _request_flight(session, row, context, mode=mode, speed=speed)
     return trial_view(session, row)
@@ -216,7 +213,7 @@ def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
     row = history.trial_row(session, trial_id)
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
+        history.set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
         record_abort(session, trial_id, StopRequest(words))
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:

@@ -16,11 +16,10 @@ from sqlalchemy import ColumnElement, Select, select, update
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
-from app.common.errors import NotFoundError
+from app.common.errors import GainlineError, NotFoundError
 from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
-from app.core.errors import GainlineError
 from app.db.base import added
 from app.db.models import CampaignRow, JobRow
 from app.db.pages import Order, page_of

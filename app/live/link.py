@@ -83,12 +83,13 @@ class LiveServer:
         self._writers: set[asyncio.StreamWriter] = set()
         self._orders: set[asyncio.Task[None]] = set()
         self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="live", daemon=True)
+        self._thread = threading.Thread(target=self._loop.run_forever, name="live", daemon=True)
 
     def __enter__(self) -> Self:
         listener = _listen(self._path)
         self._thread.start()
-        asyncio.run_coroutine_threadsafe(self._open(listener), self._loop).result()
+        serving = asyncio.start_unix_server(self._serve, sock=listener, limit=MAX_LINE_BYTES)
+        self._server = asyncio.run_coroutine_threadsafe(serving, self._loop).result()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -101,13 +102,6 @@ class LiveServer:
     def publish(self, message: PublishedMessage) -> None:
         """Send to every client, without blocking. May be called from any thread."""
         self._loop.call_soon_threadsafe(self._send_all, message)
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        self._loop.run_forever()
-
-    async def _open(self, listener: socket.socket) -> None:
-        self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=MAX_LINE_BYTES)
 
     async def _close(self) -> None:
         self._server.close()

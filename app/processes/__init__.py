@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from multiprocessing import get_context, parent_process
 from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.forkserver import ensure_running
@@ -50,7 +50,8 @@ class ProcessDiedError(Exception):
 
 
 class ChildProcess:
-    """A process of its own that calls `target(pipe, *args)`, and this end of the pipe to it.
+    """A process of its own that calls `target(pipe, *args)`, and this end of the pipe to it, which raises OSError on
+    sending when the process is dead.
 
     As a context manager, it is killed at the end, whatever its state.
     """
@@ -63,10 +64,6 @@ class ChildProcess:
         theirs.close()
 
     @property
-    def pid(self) -> int | None:
-        return self._process.pid
-
-    @property
     def alive(self) -> bool:
         return self._process.is_alive()
 
@@ -74,10 +71,6 @@ class ChildProcess:
     def exit_code(self) -> int | None:
         """The exit code; None while the process runs, and the negative number of the signal that ended it."""
         return self._process.exitcode
-
-    def send(self, message: object) -> None:
-        """Send a message. Raises OSError when the process is dead."""
-        self.pipe.send(message)
 
     def receive(self) -> Any:
         """Wait for the next message. Raises ProcessDiedError."""
@@ -133,13 +126,18 @@ def follow_parent(niceness: int) -> None:
     when the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(niceness)
-    threading.Thread(target=_exit_with_parent, daemon=True).start()
+    when_parent_ends(partial(os._exit, 0))
 
 
-def _exit_with_parent() -> None:
-    if (parent := parent_process()) is not None:
-        parent.join()
-        os._exit(0)
+def when_parent_ends(act: Callable[[], None]) -> None:
+    """Call `act` in this process, on a thread of its own, when the parent process has ended."""
+
+    def wait() -> None:
+        if (parent := parent_process()) is not None:
+            parent.join()
+            act()
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def ignore_stop_signals() -> None:

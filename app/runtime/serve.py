@@ -1,16 +1,24 @@
-"""`gainline serve`: the web process, with a worker beside it.
+"""`gainline serve`: the web process, with a worker beside it, which is kept running: it is restarted with back-off when
+it dies, and has long to stop.
 
 The worker is started first, from a function that imports no web application, so that both start in parallel.
 """
 
 import errno
+import os
 import signal
 import socket
 import sys
+import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
 from types import FrameType
-from typing import Final
+from typing import Final, Self
+
+import structlog
 
 from app import __version__
 from app.common.data_folder import make_private, prepare_data_dir
@@ -20,8 +28,20 @@ from app.common.settings import Settings
 from app.db.revision import is_current
 from app.processes import start_loading
 from app.processes.locks import LockedError, exclusive
-from app.processes.supervisor import Supervisor
 from app.web.addresses import exposure, web_address
+
+FIRST_PAUSE_S: Final = 0.2
+LONGEST_PAUSE_S: Final = 10.0
+HEALTHY_AFTER_S: Final = 20.0
+"""A child that lived this long is restarted after the shortest pause."""
+STOP_TIMEOUT_S: Final = 70.0
+"""How long a stopping child may take to land its vehicles and record the flights: landing alone may take 40 s, and Land
+is repeated for 60 s to a vehicle that may be in the air."""
+STACK_DUMP_TIMEOUT_S: Final = 0.5
+THREAD_SWITCH_INTERVAL_S: Final = 0.001
+"""Maximum time for which a thread that draws figures keeps the event loop waiting for the interpreter lock."""
+
+_log = structlog.get_logger(__name__)
 
 
 def run_worker_process(settings: Settings) -> None:
@@ -33,8 +53,68 @@ def run_worker_process(settings: Settings) -> None:
     run_supervised_worker(settings)
 
 
-THREAD_SWITCH_INTERVAL_S: Final = 0.001
-"""Maximum time for which a thread that draws figures keeps the event loop waiting for the interpreter lock."""
+class WorkerSupervisor:
+    """Runs the worker in a spawned process between enter and exit."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="worker supervisor", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._process = self._start()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        process = self._process
+        if process.is_alive():
+            process.terminate()
+        try:
+            process.join(STOP_TIMEOUT_S)
+        finally:
+            if process.is_alive():
+                _log.error("child did not stop; killing it", child="worker", pid=process.pid)
+                _dump_stacks(process)
+                process.kill()
+                process.join()
+
+    def _start(self) -> BaseProcess:
+        process = get_context("spawn").Process(target=run_worker_process, args=(self._settings,), name="worker")
+        process.start()
+        _log.info("child started", child="worker", pid=process.pid)
+        return process
+
+    def _watch(self) -> None:
+        pause_s = FIRST_PAUSE_S
+        started_s = time.monotonic()
+        while not self._stopping.is_set():
+            process = self._process
+            process.join(0.1)
+            if process.is_alive() or self._stopping.is_set():
+                continue
+            lived_s = time.monotonic() - started_s
+            pause_s = FIRST_PAUSE_S if lived_s > HEALTHY_AFTER_S else min(2 * pause_s, LONGEST_PAUSE_S)
+            _log.error(
+                "child died; restarting it",
+                child="worker",
+                pid=process.pid,
+                code=process.exitcode,
+                lived_s=round(lived_s, 1),
+                pause_s=pause_s,
+            )
+            if not self._stopping.wait(pause_s):
+                self._process = self._start()
+                started_s = time.monotonic()
+
+
+def _dump_stacks(process: BaseProcess) -> None:
+    """Have the process write its threads' stacks to standard error (`app.common.logging`)."""
+    if process.pid is not None:
+        os.kill(process.pid, signal.SIGUSR1)
+        time.sleep(STACK_DUMP_TIMEOUT_S)
 
 
 def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[str], None] = say) -> None:
@@ -65,7 +145,7 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
             migrate(settings.database_file, announce)
         if with_worker:
             announce("Starting the worker and the dashboard")
-            stack.enter_context(Supervisor(run_worker_process, settings, name="worker"))
+            stack.enter_context(WorkerSupervisor(settings))
         if (exposed := exposure(settings.host)) is not None:
             announce(exposed)
         from app.runtime.web_server import run  # noqa: PLC0415 - imported while the worker does its own imports

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from multiprocessing import parent_process
+from functools import partial
 from types import FrameType
 from typing import Final
 
@@ -41,8 +41,9 @@ from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
+from app.processes import when_parent_ends
+from app.processes.calls import ComputePool
 from app.processes.locks import LockedError, exclusive
-from app.processes.pool import ComputePool
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
 from app.vehicles.flight_end import Requester, StopRequest
@@ -96,7 +97,7 @@ def run_supervised_worker(settings: Settings) -> None:
     It waits while an older worker ends, and ends with its parent once its flights are over.
     """
     ending = ShutdownRequest()
-    threading.Thread(target=_shut_down_with_parent, args=(ending,), daemon=True).start()
+    when_parent_ends(partial(ending.set, "the web process has exited"))
     with suppress(LockedError):  # stopped while it waited for the lock
         _run(settings, ending, (signal.SIGTERM,), keep_waiting=lambda: not ending.event.is_set())
 
@@ -139,12 +140,6 @@ def _install_signal_handlers(
     threading.Thread(target=handle_signals, name="signals", daemon=True).start()
     for number in signals:
         signal.signal(number, note)
-
-
-def _shut_down_with_parent(ending: ShutdownRequest) -> None:
-    if (parent := parent_process()) is not None:
-        parent.join()
-        ending.set("the web process has exited")
 
 
 def _say_it_computes(first: Future[int]) -> None:

@@ -68,10 +68,6 @@ class HeadersMiddleware:
         await self.app(scope, receive, send_with_headers)
 
 
-_FILES: Final = 64
-"""More files than a build has."""
-
-
 class Assets(StaticFiles):
     """Static files whose names contain a hash of their content, so that the cached compressed data stays valid."""
 
@@ -87,7 +83,7 @@ class Assets(StaticFiles):
         return Response(body, media_type=answer.media_type, headers=headers)
 
 
-@lru_cache(maxsize=_FILES)
+@lru_cache(maxsize=64)  # more files than a build has
 def _compressed(file: Path) -> bytes:
     return gzip.compress(file.read_bytes(), mtime=0)
 

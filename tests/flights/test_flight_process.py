@@ -185,7 +185,7 @@ def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) 
 
     def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            os.kill(flight_process.pid or 0, signal.SIGKILL)
+            os.kill(flight_process._child._process.pid or 0, signal.SIGKILL)
 
     with pytest.raises(VehicleError, match=r"exit code -9"):
         fly(flight_process, flight_of(speed=1.0), kill)

@@ -16,6 +16,7 @@ from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow, VehicleRow
 from app.db.session import Database
 from app.fleet.service import hold_gains
+from app.flights.flight_process import FlightProcess
 from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import (
     FlightFailure,
@@ -54,7 +55,8 @@ class RunnerFixture:
                 worker="tests",
                 closing=threading.Event(),
                 clock=SimulatedClock(),
-            )
+            ),
+            session=self._session,
         )
 
     def fly_next(self) -> None:
@@ -64,7 +66,10 @@ class RunnerFixture:
 
     def kill_processes(self) -> None:
         for process in self.runner._process_pool._waiting:
-            os.kill(process.pid or 0, signal.SIGKILL)
+            os.kill(process._child._process.pid or 0, signal.SIGKILL)
+
+    def _session(self, vehicle_id: int) -> FlightProcess:
+        raise AssertionError(f"Vehicle {vehicle_id} is flown without a link.")
 
     def _hear(self, said: PublishedMessage) -> None:
         self.heard.append(said)

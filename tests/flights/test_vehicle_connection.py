@@ -161,7 +161,7 @@ def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(
             assert (silent.vehicle_id, silent.state, silent.step, silent.armed) == (5, "not answering", "record", True)
             assert "commands do not reach the vehicle" in silent.trouble
             assert "remote control" in silent.trouble
-        assert one.pid is not None
+        assert one._child._process.pid is not None
         one.send_command("land", "go on", 1.0)
         assert isinstance(next_but_silence(heard), CommandForwarded)
         assert next_but_silence(heard) == STATUS
@@ -183,6 +183,6 @@ def test_orders_to_a_process_that_reads_nothing_hold_up_nobody(tmp_path: Path) -
         answers = [one.send_command("land", "again and again", 1.0) for _ in range(5000)]
         assert not answers[0].done()
         assert "not responding" in told(answers[-1])
-        assert one.pid is not None
-        os.kill(one.pid, signal.SIGKILL)
+        assert one._child._process.pid is not None
+        os.kill(one._child._process.pid, signal.SIGKILL)
         assert "it is unknown whether the command was sent" in told(answers[0])

@@ -47,7 +47,7 @@ from app.db.models import TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
-from app.processes.sandbox import FILE, run_limited
+from app.processes.calls import FILE, run_limited
 from app.vehicles.flight_end import FlightEnd, Requester
 
 _SINGLE_PRECISION: Final = 1e-6
