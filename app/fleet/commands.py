@@ -34,7 +34,6 @@ from app.fleet.service import (
     settings_of,
     vehicle_view,
 )
-from app.fleet.views import act_view
 from app.vehicles.base import CheckItem, Identity, LinkedVehicle
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
@@ -57,7 +56,6 @@ class ActTask:
 
     act_id: int
     kind: ActKind
-    reason: str
     vehicle: LinkedVehicle
 
 
@@ -72,7 +70,7 @@ def request_act(session: Session, vehicle_id: int, kind: ActKind, context: Reque
         raise ConflictError(
             f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, without staging."
         )
-    return act_view(_requested(session, row, kind, context))
+    return VehicleAct.view_of(_requested(session, row, kind, context))
 
 
 def require_may_stop_motors(session: Session, vehicle_id: int, context: RequestContext) -> None:
@@ -139,7 +137,7 @@ def claim_act(session: Session, worker: str) -> ActTask | None:
         if utc_now() - act.requested_at <= REQUEST_TIMEOUT:
             _move(act, ActState.RUNNING)
             act.worker, act.claimed_at = worker, utc_now()
-            return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(session, act.vehicle))
+            return ActTask(act_id=act.id, kind=act.kind, vehicle=_linked(session, act.vehicle))
         _end(act, problem=f"It could not be started within {REQUEST_TIMEOUT.total_seconds():g} s. Request it again.")
     return None
 
@@ -283,16 +281,11 @@ def record_released(session: Session, vehicle_id: int, *, identity: Identity | N
     _move_to(row, VehicleState.READY, "")
 
 
-def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]) -> None:
-    """Record the results of the preflight check."""
+def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem] | None) -> None:
+    """Record the results of the preflight check; None once the vehicle has restarted, perhaps with other settings."""
     row = repository.get_one(session, vehicle_id)
-    row.checks, row.checked_at = [asdict(check) for check in checks], utc_now()
-
-
-def discard_checks(session: Session, vehicle_id: int) -> None:
-    """Discard the results of the preflight check: the vehicle has restarted since, perhaps with other settings."""
-    row = repository.get_one(session, vehicle_id)
-    row.checks = row.checked_at = None
+    row.checks = None if checks is None else [asdict(check) for check in checks]
+    row.checked_at = None if checks is None else utc_now()
 
 
 def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:

@@ -63,7 +63,14 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
             require(Permission.REAL, context.caller, new.name)
         with _noting(refused):
             _require_confirmed(new, gains)
-    _raise_all(refused)
+    if len(refused) == 1:
+        raise refused[0]
+    if refused:
+        raise InputError(
+            "The vehicle cannot be registered like this.",
+            problems=tuple(problem for error in refused for problem in error.problems),
+            hint="Correct the fields listed.",
+        )
     row = added(
         session,
         VehicleRow(
@@ -88,18 +95,6 @@ def _noting(refused: list[GainlineError]) -> Iterator[None]:
         yield
     except GainlineError as error:
         refused.append(error)
-
-
-def _raise_all(refused: list[GainlineError]) -> None:
-    """Raise the one error, or one InputError with the problems of all."""
-    if len(refused) == 1:
-        raise refused[0]
-    if refused:
-        raise InputError(
-            "The vehicle cannot be registered like this.",
-            problems=tuple(problem for error in refused for problem in error.problems),
-            hint="Correct the fields listed.",
-        )
 
 
 def _accepted_options(
@@ -138,7 +133,9 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
     vehicle.
     """
     row = repository.get_one(session, vehicle_id)
-    by = _require_editable(session, row, edit.version, _differences(row, edit), context)
+    sent = edit.model_dump(exclude={"version", "statement"}, exclude_none=True)
+    differences = {field: (getattr(row, field), value) for field, value in sent.items()}
+    by = _require_editable(session, row, edit.version, differences, context)
     if edit.options is not None:
         _set_options(session, row, edit.options, context, by=by)
     if edit.safe_gains is not None:
@@ -208,11 +205,6 @@ def _require_own(row: VehicleRow) -> None:
         raise ConflictError(
             f"{row.name} is shared by all campaigns; its settings belong to each campaign.", hint="Edit the campaign."
         )
-
-
-def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, object]]:
-    sent = edit.model_dump(exclude={"version", "statement"}, exclude_none=True)
-    return {field: (getattr(row, field), value) for field, value in sent.items()}
 
 
 def _require_unlinked(row: VehicleRow, so: str) -> None:

@@ -28,7 +28,6 @@ from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
 
 _OF_SHARED: Final = frozenset({"fly", "release"})
-_GAINS_NOT_READ_BACK: Final = "Its process ended before the safe gains were read back after the flight."
 
 
 def can_fly(row: VehicleRow) -> bool:
@@ -234,7 +233,7 @@ def doubt_gains(row: VehicleRow) -> None:
     simulated vehicle starts afresh with every flight."""
     if row.is_real:
         row.held = row.held_at = None
-        set_state_after_flight(row, concern=_GAINS_NOT_READ_BACK)
+        set_state_after_flight(row, concern="Its process ended before the safe gains were read back after the flight.")
 
 
 def is_classed_automatically(row: VehicleRow) -> bool:

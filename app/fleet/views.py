@@ -26,9 +26,9 @@ from app.vehicles.end_texts import end_text
 _NEWEST_FIRST: Final = "-at"
 
 
-def act_view(row: VehicleActRow, flight: FlightRow | None = None) -> VehicleAct:
+def _act_view(row: VehicleActRow, flight: FlightRow | None) -> VehicleAct:
     """The act; with the flight that it is a command of, its outcome follows from that of the flight."""
-    act = VehicleAct.model_validate(row, from_attributes=True)
+    act = VehicleAct.view_of(row)
     if flight is None:
         return act
     state, problem = _command_outcome(row.kind, flight)
@@ -62,15 +62,20 @@ def _flight_id(row: VehicleActRow) -> int | None:
 def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
     """Page of acts, newest first. Raises NotFoundError."""
     repository.get_one(session, vehicle_id)
-    order = Order("-id", VehicleActRow.id.expression, descending=True)
-    wanted = repository.acts_of(vehicle_id)
-    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=partial(_act_views, session))
+    return page_of(
+        session,
+        repository.acts_of(vehicle_id),
+        Order("-id", VehicleActRow.id.expression, descending=True),
+        cursor=cursor,
+        limit=limit,
+        view=partial(_act_views, session),
+    )
 
 
 def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleAct]:
     of_flights = {row.id: flight_id for row in rows if (flight_id := _flight_id(row)) is not None}
     flights = repository.rows_by_id(session, FlightRow, of_flights.values())
-    return [act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
+    return [_act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
 
 
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:

@@ -224,7 +224,12 @@ class VehicleConnectionManager:
         with self._part.database.read() as transaction:
             wanted = commands.list_vehicles_to_reconnect(transaction)
         for vehicle in wanted:
-            self._schedule_reconnect(vehicle)
+            slot = self._slot(vehicle.vehicle_id)
+            seeking = slot.reconnecting
+            if seeking is not None and seeking.call.vehicle.options != vehicle.options:
+                seeking.request_close()
+            if slot.session is None and seeking is None and slot.busy.acquire(blocking=False):
+                self._reconnect_executor.submit(self._reconnect, slot, vehicle)
 
     def _release_ended(self, vehicle_id: int, slot: VehicleSlot, gone: VehicleConnection) -> None:
         try:
@@ -235,14 +240,6 @@ class VehicleConnectionManager:
         if slot.session is gone:  # not one that was opened meanwhile
             slot.session = None
         self._publish_state(vehicle_id, "gone")
-
-    def _schedule_reconnect(self, vehicle: LinkedVehicle) -> None:
-        slot = self._slot(vehicle.vehicle_id)
-        seeking = slot.reconnecting
-        if seeking is not None and seeking.call.vehicle.options != vehicle.options:
-            seeking.request_close()
-        if slot.session is None and seeking is None and slot.busy.acquire(blocking=False):
-            self._reconnect_executor.submit(self._reconnect, slot, vehicle)
 
     def _reconnect(self, slot: VehicleSlot, vehicle: LinkedVehicle) -> None:
         """Connect a wanted vehicle, with `busy` held. Errors are logged only, because the next attempt follows
@@ -306,7 +303,7 @@ class VehicleConnectionManager:
             case VehicleStatus(concern=concern, restarts=restarts):
                 self._part.publish(news)
                 if slot.restarts is not None and restarts > slot.restarts:
-                    self._record_in_background(lambda t: commands.discard_checks(t, vehicle_id))
+                    self._record_in_background(lambda t: commands.record_checks(t, vehicle_id, None))
                 slot.restarts = restarts
                 if concern and concern != slot.concern:
                     self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))

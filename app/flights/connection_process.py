@@ -14,14 +14,12 @@ from typing import Final
 
 from app.common.data_folder import telemetry_log, trial_parameters_folder, vehicle_lock
 from app.common.states import ActKind
-from app.core.errors import GainlineError
 from app.flights.flight_loop import (
     FlightLoop,
     PipeClosedError,
     WorkerPipe,
     failure_from,
     hold_vehicle_lock,
-    internal_error,
 )
 from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S
 from app.flights.process_messages import (
@@ -66,7 +64,6 @@ LOCK_TIMEOUT_S: Final = 120.0
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
 """How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
 lock."""
-_NOT_STOPPED: Final = "The vehicle has not confirmed that its motors stopped."
 _EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was notified."
 
 
@@ -83,10 +80,8 @@ def run_connection_process(pipe: Connection, call: ConnectionRequest) -> None:
             process.run()
     except PipeClosedError:
         pass
-    except GainlineError as error:
-        line.send(failure_from(error))
     except Exception as error:  # noqa: BLE001 - outermost frame of the process; the worker's log has the error
-        line.send(internal_error(error))
+        line.send(failure_from(error))
     finally:
         pipe.close()
         os._exit(0)
@@ -112,12 +107,16 @@ class VehicleProcess(FlightLoop):
     def run(self) -> None:
         """Carry out requests one after another.
 
-        Raises PipeClosedError when the worker closes the pipe or dies, VehicleError when the link fails.
+        Raises PipeClosedError when the worker closes the pipe or dies, VehicleError when the link fails. After the
+        worker's end a land or motors off command is repeated until telemetry confirms it, for at most
+        STANDING_ORDER_TIMEOUT_S; not at all if it was already repeated that long without a packet from the vehicle.
         """
         try:
             super().run()
         except PipeClosedError:
-            self._finish_order()
+            until_s = self._clock.now_s() + STANDING_ORDER_TIMEOUT_S
+            while self._vehicle.has_standing_order and self._clock.now_s() < until_s:
+                self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             raise
 
     def _carry_out(self, asked: ToVehicleProcess) -> None:
@@ -125,13 +124,6 @@ class VehicleProcess(FlightLoop):
             self._line.send(self._act(asked))
         else:
             super()._carry_out(asked)
-
-    def _finish_order(self) -> None:
-        """Repeat a land or motors off command after the worker's end until telemetry confirms it, for at most
-        STANDING_ORDER_TIMEOUT_S; not at all if it was already repeated that long without a packet from the vehicle."""
-        until_s = self._clock.now_s() + STANDING_ORDER_TIMEOUT_S
-        while self._vehicle.has_standing_order and self._clock.now_s() < until_s:
-            self._vehicle.attend(POLL_INTERVAL_S * self._speed)
 
     def close(self) -> None:
         self._vehicle.close()
@@ -244,8 +236,9 @@ class VehicleProcess(FlightLoop):
 
     def _report_stops(self) -> None:
         if self._stops and (has_stopped := self._vehicle.has_stopped) is not None:
+            problem = "" if has_stopped else "The vehicle has not confirmed that its motors stopped."
             for each in self._stops:
-                self._line.send(replace(each, problem="" if has_stopped else _NOT_STOPPED, is_awaited=False))
+                self._line.send(replace(each, problem=problem, is_awaited=False))
             self._stops.clear()
 
     def _publish_status(self) -> VehicleStatus | None:
@@ -265,6 +258,7 @@ class VehicleProcess(FlightLoop):
     # ---- acts
 
     def _act(self, asked: VehicleRequest) -> VehicleResponse:
+        checks, parameters = None, None
         try:
             if self._vehicle.condition().armed:  # a slow operation would delay Land
                 raise VehicleError(
@@ -272,25 +266,21 @@ class VehicleProcess(FlightLoop):
                 )
             self._require_safe_gains(asked.safe_gains)
             with self._interruptible():
-                return self._perform(asked.kind)
+                match asked.kind:
+                    case ActKind.CHECK:
+                        checks = self._vehicle.check()
+                    case ActKind.PARAMETERS:
+                        parameters = self._vehicle.parameters()
+                    case ActKind.RESTORE:
+                        self._vehicle.restore()
+                    case ActKind.RELEASE:
+                        self._vehicle.release()
+                    case kind:
+                        raise VehicleError(
+                            f"A vehicle connection cannot execute “{kind}”.", hint="Report this with the worker's log."
+                        )
         except VehicleError as error:
             return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
-
-    def _perform(self, kind: ActKind) -> VehicleResponse:
-        checks, parameters = None, None
-        match kind:
-            case ActKind.CHECK:
-                checks = self._vehicle.check()
-            case ActKind.PARAMETERS:
-                parameters = self._vehicle.parameters()
-            case ActKind.RESTORE:
-                self._vehicle.restore()
-            case ActKind.RELEASE:
-                self._vehicle.release()
-            case _:
-                raise VehicleError(
-                    f"A vehicle connection cannot execute “{kind}”.", hint="Report this with the worker's log."
-                )
         return VehicleResponse(
             concern=self._vehicle.concern,
             held=self._held(),

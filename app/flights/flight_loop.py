@@ -34,8 +34,7 @@ from app.flights.process_messages import (
     VehicleCommand,
 )
 from app.live.messages import FlightPhase, Telemetry
-from app.processes import ignore_stop_signals
-from app.processes.locks import LockedError, exclusive
+from app.processes import LockedError, exclusive, ignore_stop_signals
 from app.vehicles.base import (
     FlightRecord,
     SafeGainsError,
@@ -143,12 +142,10 @@ class FlightLoop(ABC):
                 self._line.send(GainsStaged(read_back))
                 if (cleared := self._await_takeoff_clearance()) is not None:
                     self._line.send(FlightLanded(self._take_off(vehicle, request, cleared)))
-        except GainlineError as error:
-            self._line.send(failure_from(error))
         except PipeClosedError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
-            self._line.send(internal_error(error))
+            self._line.send(failure_from(error))
         finally:
             self._trial_id = None
         self._line.send(FlightFinished())
@@ -225,11 +222,13 @@ def run_simulations(pipe: Connection, data_dir: Path, clock: Clock) -> None:
         os._exit(0)
 
 
-def failure_from(error: GainlineError) -> FlightFailure:
-    """Build the failure message of an error.
+def failure_from(error: Exception) -> FlightFailure:
+    """Build the failure message of an error, also of an internal one, so that the trial gets a definite end.
 
     If the error followed from a refusal to fly, the refusal comes first.
     """
+    if not isinstance(error, GainlineError):
+        return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
     refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
     what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
     return FlightFailure(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
@@ -240,11 +239,6 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
     while error is not None:
         yield error
         error = error.__context__
-
-
-def internal_error(error: Exception) -> FlightFailure:
-    """Failure message of an internal error, so that the trial gets a definite end."""
-    return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
 
 
 @contextmanager
@@ -291,8 +285,11 @@ class FlightMonitor:
     def sample(self, sample: Sample) -> None:
         output = self._experiment.output
         target = self._target(sample)
-        if target is not None:
-            self._score(sample.time_s, abs(target - sample[output]))
+        if target is not None and self._scored_from_s <= sample.time_s <= self._scored_until_s:
+            deviation = abs(target - sample[output])
+            before_s, before = self._last if self._last is not None else (self._scored_from_s, deviation)
+            self._integral += (sample.time_s - before_s) * (before + deviation) / 2.0
+            self._last = (sample.time_s, deviation)
         others = [name for name in sample.channels if name != output]
         if (columns := ["time_s", output, *others]) != self._columns:  # a vehicle may report more from some time on
             self.flush()
@@ -331,9 +328,3 @@ class FlightMonitor:
         if channel is not None:
             return sample.channels.get(channel)
         return float(self._experiment.set_point(np.array([sample.time_s]))[0])
-
-    def _score(self, time_s: float, deviation: float) -> None:
-        if self._scored_from_s <= time_s <= self._scored_until_s:
-            before_s, before = self._last if self._last is not None else (self._scored_from_s, deviation)
-            self._integral += (time_s - before_s) * (before + deviation) / 2.0
-            self._last = (time_s, deviation)

@@ -36,9 +36,6 @@ from app.vehicles.flight_end import FlightEnd, GainsLeft, Landing, Requester, St
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
-_NO_RECORD: Final = "its process ended without a record"
-_WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "the worker stopped before lift-off"}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOutcome:
@@ -65,7 +62,7 @@ class FlightOutcome:
         if self.record is not None:
             return self.record.end
         if self.lifted_off:
-            return FlightEnd(remarks=(self.problem or _NO_RECORD,), landed=Landing.UNKNOWN)
+            return FlightEnd(remarks=(self.problem or "its process ended without a record",), landed=Landing.UNKNOWN)
         return self.end or not_begun(self.problem)
 
     def gains_left(self, end: FlightEnd, safe_gains: Mapping[str, float] | None) -> FlightEnd:
@@ -143,7 +140,24 @@ def claim_flight(session: Session, worker: str) -> FlightRequest | None:
     """
     while (flight := _first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
-            return _claimed(flight, worker)
+            set_flight_state(flight, FlightState.RUNNING)
+            flight.worker, flight.claimed_at = worker, utc_now()
+            flight.safe_gains = dict(flight.vehicle.safe_gains)
+            return FlightRequest(
+                flight_id=flight.id,
+                trial_id=flight.trial_id,
+                campaign_id=flight.campaign_id,
+                experiment=flight.campaign.experiment,
+                experiment_options=flight.campaign.definition["experiment_options"],
+                vehicle_id=flight.vehicle_id,
+                vehicle_kind=flight.vehicle.kind,
+                vehicle_options=fleet.options_of(flight.campaign),
+                safe_gains=dict(flight.safe_gains),
+                gains=dict(flight.gains),
+                seed=flight.trial.seed,
+                speed=flight.speed,
+                mode=flight.mode,
+            )
         _withdraw(flight, f"it could not be started within {REQUEST_TIMEOUT.total_seconds():g} s")
     return None
 
@@ -163,27 +177,6 @@ def _withdraw(flight: FlightRow, reason: str) -> None:
         flight,
         FlightState.CANCELLED,
         end=not_begun(f"The flight was not started: {reason}. Request it again if it is still needed."),
-    )
-
-
-def _claimed(flight: FlightRow, worker: str) -> FlightRequest:
-    set_flight_state(flight, FlightState.RUNNING)
-    flight.worker, flight.claimed_at = worker, utc_now()
-    flight.safe_gains = dict(flight.vehicle.safe_gains)
-    return FlightRequest(
-        flight_id=flight.id,
-        trial_id=flight.trial_id,
-        campaign_id=flight.campaign_id,
-        experiment=flight.campaign.experiment,
-        experiment_options=flight.campaign.definition["experiment_options"],
-        vehicle_id=flight.vehicle_id,
-        vehicle_kind=flight.vehicle.kind,
-        vehicle_options=fleet.options_of(flight.campaign),
-        safe_gains=dict(flight.safe_gains),
-        gains=dict(flight.gains),
-        seed=flight.trial.seed,
-        speed=flight.speed,
-        mode=flight.mode,
     )
 
 
@@ -243,9 +236,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     trial = flight.trial
     may_take_off, stands_down = _clearance(flight)
     if not may_take_off:
-        why = "its takeoff has not been requested"
-        if stands_down is not None:
-            why = end_text(stands_down.ended)
+        why = "its takeoff has not been requested" if stands_down is None else end_text(stands_down.ended)
         raise ConflictError(
             f"Flight {trial.number} cannot be flown: {why}.", hint="Stage it again if it is still needed."
         )
@@ -297,11 +288,12 @@ def lose_running_flights(session: Session) -> list[int]:
 
     Those in the air are lost; the trials of those only staged are planned again. Returns the ids of the lost trials.
     """
-    return [
-        flight.trial_id
-        for flight in session.scalars(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all()
-        if _give_up(session, flight, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
-    ]
+    lost = []
+    for flight in session.scalars(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all():
+        when = "during the flight" if flight.trial.state == TrialState.FLYING else "before lift-off"
+        if _give_up(session, flight, f"the worker stopped {when}"):
+            lost.append(flight.trial_id)
+    return lost
 
 
 def recover_record(session: Session, flight_id: int, record: FlightRecord) -> None:

@@ -54,8 +54,6 @@ class LossText:
     keeps: ReadinessStep | None = "control"
 
 
-_BY_HAND: Final = "If it does not descend, use its own remote control."
-
 LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
     {
         "worker away": LossText(
@@ -86,7 +84,8 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
             way_on_planned="Check its power and its radio.",
             what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on_in_flight=f"Land is repeated until the vehicle descends. {_BY_HAND}",
+            way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
+            "control.",
         ),
         "gains unknown": LossText(
             what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
@@ -279,9 +278,10 @@ def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
     found: list[LossKind] = []
     is_quarantined = standing.vehicle is VehicleState.QUARANTINED
     link = _link_loss(standing, report)
+    battery_v = None if report.status is None else report.status.battery_v
     if link is not None and not (is_quarantined and link in _ENDED_BY_RELEASE):
         found.append(link)
-    elif link is None and _is_battery_low(standing, report):
+    elif link is None and battery_v is not None and battery_v < standing.min_battery_v:
         found.append("battery low")
     if standing.failed_checks and link is None and not is_quarantined:
         found.append("checks failed")
@@ -306,11 +306,6 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     if status.state == "gone":
         return "link silent"
     return status.unready or None
-
-
-def _is_battery_low(standing: Standing, report: VehicleReport) -> bool:
-    battery_v = None if report.status is None else report.status.battery_v
-    return battery_v is not None and battery_v < standing.min_battery_v
 
 
 def _count(kept: ReadinessStep | None) -> int:

@@ -3,7 +3,6 @@ entries in a registered vehicle's log of commands. The rows of flights are in `f
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -42,7 +41,6 @@ from app.live.hub import VehicleReport
 from app.vehicles.end_texts import request_text, unstaged_text
 from app.vehicles.flight_end import Landing, Requester, StopRequest, withdrawn_by
 
-_NOT_LANDED: Final = frozenset({Landing.FELL, Landing.UNKNOWN})
 ReportOf = Callable[[int], VehicleReport]
 """What is known of a vehicle at this moment, by its id."""
 
@@ -128,7 +126,9 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         abort_cause_open=row.abort_cause == "operator",
         failed_checks=tuple(str(check["title"]) for check in vehicle.checks or () if not check["passed"]),
         was_lost_in_flight=_was_lost_in_flight(row, flight),
-        has_not_landed=row.ending is not None and row.end is not None and row.end.landed in _NOT_LANDED,
+        has_not_landed=row.ending is not None
+        and row.end is not None
+        and row.end.landed in {Landing.FELL, Landing.UNKNOWN},
         flown_for_s=0.0 if row.flown_at is None else (utc_now() - row.flown_at).total_seconds(),
     )
     return readiness_of(standing, report_of(vehicle.id))

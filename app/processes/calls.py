@@ -158,13 +158,7 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
             f"{MAX_CONCURRENT} files are already being read.",
             hint="Send this file again in a few seconds; nothing was stored.",
         )
-    try:
-        return _run(limits, partial(function, *args, **kwargs))
-    finally:
-        _places.release()
-
-
-def _run(limits: Limits, task: Callable[[], T]) -> T:
+    task = partial(function, *args, **kwargs)
     try:
         with ChildProcess(_perform, limits, task, name="reading") as child:
             if not child.pipe.poll(limits.wall_s):
@@ -173,6 +167,8 @@ def _run(limits: Limits, task: Callable[[], T]) -> T:
         return result_of(outcome)
     except (ProcessDiedError, MemoryError) as error:  # it used up the processor time or the memory
         raise _too_much(limits) from error
+    finally:
+        _places.release()
 
 
 def _perform(pipe: Connection, limits: Limits, task: Callable[[], object]) -> None:

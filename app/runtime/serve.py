@@ -26,8 +26,7 @@ from app.common.errors import AddressError, AlreadyRunningError, Problem
 from app.common.logging import configure_logs, say
 from app.common.settings import Settings
 from app.db.revision import is_current
-from app.processes import start_loading
-from app.processes.locks import LockedError, exclusive
+from app.processes import LockedError, exclusive, start_loading
 from app.web.addresses import exposure, web_address
 
 FIRST_PAUSE_S: Final = 0.2
@@ -69,17 +68,16 @@ class WorkerSupervisor:
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
         self._thread.join()
-        process = self._process
-        if process.is_alive():
-            process.terminate()
+        if self._process.is_alive():
+            self._process.terminate()
         try:
-            process.join(STOP_TIMEOUT_S)
+            self._process.join(STOP_TIMEOUT_S)
         finally:
-            if process.is_alive():
-                _log.error("child did not stop; killing it", child="worker", pid=process.pid)
-                _dump_stacks(process)
-                process.kill()
-                process.join()
+            if self._process.is_alive():
+                _log.error("child did not stop; killing it", child="worker", pid=self._process.pid)
+                _dump_stacks(self._process)
+                self._process.kill()
+                self._process.join()
 
     def _start(self) -> BaseProcess:
         process = get_context("spawn").Process(target=run_worker_process, args=(self._settings,), name="worker")
@@ -133,7 +131,14 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         try:
             sign = stack.enter_context(exclusive(settings.data_dir / "server.lock"))
         except LockedError as error:
-            raise _already_served(settings, error) from error
+            where = error.holder.address if error.holder else ""
+            raise AlreadyRunningError(
+                f"Another Gainline server ({error.holder or 'its process is unknown'}) already uses "
+                f"{settings.database_file}.",
+                hint=(f"Open {where}, " if where else "Use that one, ")
+                + "stop it first, or choose another folder for this server with --data-dir. The running server is "
+                "not affected.",
+            ) from error
         sys.setswitchinterval(THREAD_SWITCH_INTERVAL_S)
         listener = stack.enter_context(listen(settings.host, settings.port))
         sign(web_address(settings.host, listener.getsockname()[1]))
@@ -159,35 +164,19 @@ def listen(host: str, port: int) -> socket.socket:
         family, _, _, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         return socket.create_server(where[:2], family=family, backlog=2048)
     except OSError as error:
-        raise _no_address(host, port, error) from error
+        match error.errno:
+            case errno.EADDRINUSE:
+                problem = Problem("port", f"{port} is in use by another program")
+                hint = f"Stop that program, or choose another port: --port {port % 65535 + 1} (0 selects a free one)."
+            case errno.EACCES:
+                problem = Problem("port", f"this user has no permission to open port {port}")
+                hint = "Choose a port above 1023, for instance --port 8000."
+            case _:
+                problem = Problem("host", f"{host} is not an address of this computer ({error.strerror or error})")
+                hint = "Use --host 127.0.0.1 (this computer only) or one of this computer's addresses."
+        raise AddressError(f"Gainline cannot listen on {host}, port {port}.", hint=hint, problems=(problem,)) from error
 
 
 def _exit(_signal: int, _frame: FrameType | None) -> None:
     """Unwind the stack. Uvicorn handles signals while it runs, and raises them again after its shutdown."""
     raise SystemExit(0)
-
-
-def _already_served(settings: Settings, error: LockedError) -> AlreadyRunningError:
-    where = error.holder.address if error.holder else ""
-    return AlreadyRunningError(
-        f"Another Gainline server ({error.holder or 'its process is unknown'}) already uses {settings.database_file}.",
-        hint=(f"Open {where}, " if where else "Use that one, ")
-        + (
-            "stop it first, or choose another folder for this server with --data-dir. The running server is "
-            "not affected."
-        ),
-    )
-
-
-def _no_address(host: str, port: int, error: OSError) -> AddressError:
-    match error.errno:
-        case errno.EADDRINUSE:
-            problem = Problem("port", f"{port} is in use by another program")
-            hint = f"Stop that program, or choose another port: --port {port % 65535 + 1} (0 selects a free one)."
-        case errno.EACCES:
-            problem = Problem("port", f"this user has no permission to open port {port}")
-            hint = "Choose a port above 1023, for instance --port 8000."
-        case _:
-            problem = Problem("host", f"{host} is not an address of this computer ({error.strerror or error})")
-            hint = "Use --host 127.0.0.1 (this computer only) or one of this computer's addresses."
-    return AddressError(f"Gainline cannot listen on {host}, port {port}.", hint=hint, problems=(problem,))

@@ -41,9 +41,8 @@ from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
-from app.processes import when_parent_ends
+from app.processes import LockedError, exclusive, when_parent_ends
 from app.processes.calls import ComputePool
-from app.processes.locks import LockedError, exclusive
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
 from app.vehicles.flight_end import Requester, StopRequest
@@ -62,12 +61,12 @@ interpreter lock; Python's default of 5 ms adds up over several threads."""
 _log = structlog.get_logger(__name__)
 
 
+@dataclass(slots=True)
 class ShutdownRequest:
     """Request that the worker ends: it then claims no new work, and finishes its flights."""
 
-    def __init__(self) -> None:
-        self.event = threading.Event()
-        self.reason = ""
+    event: threading.Event = field(default_factory=threading.Event)
+    reason: str = ""
 
     def set(self, reason: str) -> None:
         self.reason = self.reason or reason
