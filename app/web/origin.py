@@ -52,8 +52,9 @@ class AccessMiddleware:
 
 def _refusal(request: Request) -> Response | None:
     address = request.headers.get("host", "")
-    name, own_name = _name_of(address), request.app.state.settings.host.lower()
-    if name not in {"localhost", own_name} and not _is_ip_address(name):  # DNS rebinding needs a name
+    name = _name_of(address)
+    own_names = {"localhost", request.app.state.settings.host.lower()}
+    if name not in own_names and not _is_ip_address(name):  # DNS rebinding needs a name
         return foreign_request_response(
             f"This server does not accept requests for the host name “{address}”.",
             "Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
