@@ -33,7 +33,7 @@ from app.live.hub import live_link
 from app.log_analyses.router import router as log_analyses
 from app.reports.router import router as reports
 from app.reproductions.router import router as reproductions
-from app.web import errors, events, system, unlock
+from app.web import errors, events, system
 from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware
 from app.web.origin import AccessMiddleware
 
@@ -77,7 +77,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for router in (
         catalogue.router,
         system.router,
-        unlock.unlock_router,
         campaigns.router,
         trials.router,
         flights,
@@ -97,14 +96,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     ):
         app.include_router(router)
     errors.install(app)
-    errors.describe(app)
-    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.problem_response)
-    app.add_middleware(
-        AccessMiddleware,
-        host=settings.host,
-        refuse_foreign=errors.foreign_request_response,
-        refuse=errors.problem_response,
-    )
+    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes)
+    app.add_middleware(AccessMiddleware)
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=COMPRESSION)
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():

@@ -28,7 +28,7 @@ from app.fleet.schemas import VehicleChoice
 from app.flights import flight_rows
 from app.flights import service as flights
 from app.jobs.runner import JobRunner
-from app.processes.pool import ComputePool
+from app.processes.calls import ComputePool
 from app.vehicles.base import FlightOptions as Order
 from app.vehicles.registry import open_vehicle
 from bench.timing.machine import measured_slowness

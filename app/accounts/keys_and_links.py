@@ -25,7 +25,6 @@ from app.common.errors import StorageError
 
 LINK_VALID_S: Final = 15 * 60
 _SECRET_BYTES: Final = 32
-_GIVEN_BY_PLACE: Final = {RequestOrigin.HERE: Key.BROWSER, RequestOrigin.ELSEWHERE: Key.REMOTE}
 
 
 class Keyring:
@@ -61,7 +60,7 @@ class Keyring:
 
     def given_to(self, place: RequestOrigin) -> Key:
         """The key that a browser at that place gets for a link."""
-        return _GIVEN_BY_PLACE[place]
+        return Key.BROWSER if place is RequestOrigin.HERE else Key.REMOTE
 
     def key_of(self, shown: str) -> Key:
         """The key that this value presents; `Key.NONE` for any other value."""
@@ -69,8 +68,11 @@ class Keyring:
         return max(same, default=Key.NONE)
 
     def new_link(self) -> str:
-        """Create a link that works once within LINK_VALID_S (15 minutes), and return its token."""
-        self._drop_old()
+        """Create a link that works once within LINK_VALID_S (15 minutes), and return its token; delete older ones."""
+        for file in self._links.iterdir():
+            with suppress(FileNotFoundError):
+                if self._now_s() - file.stat().st_mtime > LINK_VALID_S:
+                    file.unlink()
         token = secrets.token_urlsafe(_SECRET_BYTES)
         self._file(token).touch(mode=0o600)
         os.utime(self._file(token), (self._now_s(), self._now_s()))
@@ -90,12 +92,6 @@ class Keyring:
 
     def _file(self, token: str) -> Path:
         return self._links / hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
-
-    def _drop_old(self) -> None:
-        for file in self._links.iterdir():
-            with suppress(FileNotFoundError):
-                if self._now_s() - file.stat().st_mtime > LINK_VALID_S:
-                    file.unlink()
 
 
 def _secret(file: Path) -> bytes:

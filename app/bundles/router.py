@@ -11,8 +11,7 @@ from app.bundles.export import write_bundle
 from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
 from app.campaigns.schemas import Campaign
-from app.web.dependencies import FILE_BODY, CurrentDatabase, CurrentSettings, Id, Record
-from app.web.downloads import described, download
+from app.web.dependencies import FILE_BODY, CurrentDatabase, CurrentSettings, Id, Record, described, download
 
 router = APIRouter(prefix="/api", tags=["bundles"])
 

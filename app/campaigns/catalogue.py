@@ -14,7 +14,7 @@ from app.common.schemas import OptionValue, Schema
 from app.core.policy import Gain
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
-from app.fleet.views import is_registered_one_by_one
+from app.fleet.service import is_registered_one_by_one
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
 from app.web.dependencies import Live
 

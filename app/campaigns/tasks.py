@@ -13,7 +13,7 @@ from app.core.tuning.landscape import predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob
-from app.processes.pool import ComputePool
+from app.processes.calls import ComputePool
 
 POINTS_PER_BATCH: Final = 48
 """Number of gain sets of a landscape per request to the pool, which limits how long a proposal has to wait."""

@@ -7,8 +7,7 @@ from fastapi import APIRouter, Query, Response
 from app.compare import service
 from app.compare.schemas import FlightComparison
 from app.figures.base import Card
-from app.web.dependencies import Reader, Theme
-from app.web.downloads import described
+from app.web.dependencies import Reader, Theme, described
 
 router = APIRouter(prefix="/api/compare", tags=["compare"])
 

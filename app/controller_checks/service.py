@@ -17,7 +17,7 @@ from app.db.pages import Order, page_of
 from app.figures.base import Card, card_of
 from app.figures.panels import PanelsFigure, replica_plot
 from app.figures.theme import ThemeName
-from app.processes.sandbox import FILE, run_limited
+from app.processes.calls import FILE, run_limited
 from app.reproductions.controller import RECORDED_TAKEOFF
 
 

@@ -20,15 +20,20 @@ from app.accounts.permissions import Permission, RequestContext
 from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
-from app.core.policy import Gains
 from app.db.base import added
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.types import JsonObject, utc_now
 from app.fleet import repository
 from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import Vehicle, VehicleAct
-from app.fleet.service import hold_gains, require_idle, set_vehicle_state
-from app.fleet.views import act_view, is_linked_or_wanted, settings_of, vehicle_view
+from app.fleet.service import (
+    hold_gains,
+    is_linked_or_wanted,
+    require_idle,
+    set_vehicle_state,
+    settings_of,
+    vehicle_view,
+)
 from app.vehicles.base import CheckItem, Identity, LinkedVehicle
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
@@ -51,7 +56,6 @@ class ActTask:
 
     act_id: int
     kind: ActKind
-    reason: str
     vehicle: LinkedVehicle
 
 
@@ -66,7 +70,7 @@ def request_act(session: Session, vehicle_id: int, kind: ActKind, context: Reque
         raise ConflictError(
             f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, without staging."
         )
-    return act_view(_requested(session, row, kind, context))
+    return VehicleAct.view_of(_requested(session, row, kind, context))
 
 
 def require_may_stop_motors(session: Session, vehicle_id: int, context: RequestContext) -> None:
@@ -111,15 +115,17 @@ def _requested(
 
 
 def _add(session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: str = "") -> VehicleActRow:
-    act = VehicleActRow(
-        vehicle_id=row.id,
-        kind=kind,
-        state=ActState.REQUESTED,
-        by=by,
-        reason=reason,
-        asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
+    return added(
+        session,
+        VehicleActRow(
+            vehicle_id=row.id,
+            kind=kind,
+            state=ActState.REQUESTED,
+            by=by,
+            reason=reason,
+            asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
+        ),
     )
-    return added(session, act)
 
 
 def claim_act(session: Session, worker: str) -> ActTask | None:
@@ -131,7 +137,7 @@ def claim_act(session: Session, worker: str) -> ActTask | None:
         if utc_now() - act.requested_at <= REQUEST_TIMEOUT:
             _move(act, ActState.RUNNING)
             act.worker, act.claimed_at = worker, utc_now()
-            return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(session, act.vehicle))
+            return ActTask(act_id=act.id, kind=act.kind, vehicle=_linked(session, act.vehicle))
         _end(act, problem=f"It could not be started within {REQUEST_TIMEOUT.total_seconds():g} s. Request it again.")
     return None
 
@@ -174,12 +180,10 @@ def finish_connect(
     record_connected(session, task.vehicle.vehicle_id, identity, concern=concern, held=held)
 
 
-def withdraw_acts(session: Session) -> list[int]:
-    """End all requested and running acts at a worker's start; they are not carried out later. Returns their ids."""
-    found = repository.acts_under_way(session)
-    for act in found:
+def withdraw_acts(session: Session) -> None:
+    """End all requested and running acts at a worker's start; they are not carried out later."""
+    for act in repository.acts_under_way(session):
         _end(act, problem=f"{_WITHDRAWN[act.state]} Request it again if it is still needed.")
-    return [act.id for act in found]
 
 
 def forget_connections(session: Session) -> None:
@@ -213,7 +217,7 @@ def record_reconnected(
 
     Returns False, and leaves the vehicle disconnected, if it is no longer wanted connected or was deleted.
     """
-    row = repository.one_or_none(session, vehicle_id)
+    row = session.get(VehicleRow, vehicle_id)
     if row is None or not row.wanted_connected:
         return False
     read_back = dict(held) or None
@@ -242,13 +246,13 @@ def record_connected(
     the vehicle that answers now.
     """
     row = repository.get_one(session, vehicle_id)
-    row.concern = concern or row.concern
+    known = concern or row.concern
     row.checks = row.checked_at = None
     if not concern:
         _pin(row, identity)
     if held is not None:
         hold_gains(row, held)
-    _move_to(row, VehicleState.QUARANTINED if row.concern else VehicleState.READY)
+    _move_to(row, VehicleState.QUARANTINED if known else VehicleState.READY, known)
 
 
 def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
@@ -259,37 +263,29 @@ def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
 def record_disconnected(session: Session, vehicle_id: int, *, concern: str = "") -> None:
     """Record a closed link. A concern is kept: the vehicle is quarantined when it is connected again."""
     row = repository.get_one(session, vehicle_id)
-    row.concern = concern or row.concern
-    _move_to(row, VehicleState.DISCONNECTED)
+    _move_to(row, VehicleState.DISCONNECTED, concern or row.concern)
 
 
 def quarantine_vehicle(session: Session, vehicle_id: int, concern: str) -> None:
     """Quarantine the vehicle; `concern` says what could not be verified."""
     row = repository.get_one(session, vehicle_id)
-    row.concern = concern
-    _move_to(row, VehicleState.QUARANTINED)
+    _move_to(row, VehicleState.QUARANTINED, concern)
 
 
 def record_released(session: Session, vehicle_id: int, *, identity: Identity | None = None) -> None:
     """End the quarantine. `identity`: the identity that answers now, which the person has accepted."""
     row = repository.get_one(session, vehicle_id)
-    row.concern = ""
     row.checks = row.checked_at = None
     if identity is not None:
         row.identity = asdict(identity)
-    _move_to(row, VehicleState.READY)
+    _move_to(row, VehicleState.READY, "")
 
 
-def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]) -> None:
-    """Record the results of the preflight check."""
+def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem] | None) -> None:
+    """Record the results of the preflight check; None once the vehicle has restarted, perhaps with other settings."""
     row = repository.get_one(session, vehicle_id)
-    row.checks, row.checked_at = [asdict(check) for check in checks], utc_now()
-
-
-def discard_checks(session: Session, vehicle_id: int) -> None:
-    """Discard the results of the preflight check: the vehicle has restarted since, perhaps with other settings."""
-    row = repository.get_one(session, vehicle_id)
-    row.checks = row.checked_at = None
+    row.checks = None if checks is None else [asdict(check) for check in checks]
+    row.checked_at = None if checks is None else utc_now()
 
 
 def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:
@@ -313,7 +309,7 @@ def _linked(session: Session, row: VehicleRow) -> LinkedVehicle:
     )
 
 
-def _was_given(row: VehicleRow, read_back: Gains | None) -> bool:
+def _was_given(row: VehicleRow, read_back: Mapping[str, float] | None) -> bool:
     """Whether connecting wrote the safe gains; on a vehicle that is armed, absent or not pinned nothing is written."""
     return row.identity is not None and read_back is not None
 
@@ -328,7 +324,8 @@ def _pin(row: VehicleRow, identity: Identity) -> None:
     row.identity = asdict(identity if pinned is None else pinned.completed_by(identity))
 
 
-def _move_to(row: VehicleRow, state: VehicleState) -> None:
+def _move_to(row: VehicleRow, state: VehicleState, concern: str) -> None:
+    row.concern = concern
     if row.state != state:
         set_vehicle_state(row, state)
 

@@ -147,18 +147,20 @@ def record_act(
     """Record an act that is complete at once because it needs no answer from the vehicle, or has that of its
     flight."""
     now = utc_now()
-    act = VehicleActRow(
-        vehicle_id=row.id,
-        kind=kind,
-        state=ActState.DONE,
-        by=by,
-        reason=reason,
-        asked=asked,
-        result=result,
-        requested_at=now,
-        finished_at=now,
+    return added(
+        session,
+        VehicleActRow(
+            vehicle_id=row.id,
+            kind=kind,
+            state=ActState.DONE,
+            by=by,
+            reason=reason,
+            asked=asked,
+            result=result,
+            requested_at=now,
+            finished_at=now,
+        ),
     )
-    return added(session, act)
 
 
 def _granted(session: Session, row: VehicleRow, operator: str, token: str) -> Lease:

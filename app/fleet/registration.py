@@ -12,10 +12,9 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import Permission, RequestContext, require
 from app.autopilots.registry import get_experiment
 from app.common.conflict_checks import check_action, check_version
-from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
+from app.common.errors import ConflictError, GainlineError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
-from app.core.errors import GainlineError
 from app.core.formatting import EXACT_DIGITS, format_gains, setting_text
 from app.core.policy import PolicySpace
 from app.db.base import added
@@ -23,8 +22,13 @@ from app.db.models import VehicleRow
 from app.fleet import repository
 from app.fleet.control import record_act, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
-from app.fleet.service import require_idle
-from app.fleet.views import is_linked_or_wanted, is_registered_one_by_one, settings_of, vehicle_view
+from app.fleet.service import (
+    is_linked_or_wanted,
+    is_registered_one_by_one,
+    require_idle,
+    settings_of,
+    vehicle_view,
+)
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import IMPORT, VEHICLE_KINDS, get_kind
 
@@ -59,18 +63,27 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
             require(Permission.REAL, context.caller, new.name)
         with _noting(refused):
             _require_confirmed(new, gains)
-    _raise_all(refused)
-    row = VehicleRow(
-        kind=kind.name,
-        name=new.name,
-        title=kind.title,
-        is_real=is_real,
-        registered=True,
-        options=options,
-        safe_gains=gains,
-        state=VehicleState.DISCONNECTED,
+    if len(refused) == 1:
+        raise refused[0]
+    if refused:
+        raise InputError(
+            "The vehicle cannot be registered like this.",
+            problems=tuple(problem for error in refused for problem in error.problems),
+            hint="Correct the fields listed.",
+        )
+    row = added(
+        session,
+        VehicleRow(
+            kind=kind.name,
+            name=new.name,
+            title=kind.title,
+            is_real=is_real,
+            registered=True,
+            options=options,
+            safe_gains=gains,
+            state=VehicleState.DISCONNECTED,
+        ),
     )
-    added(session, row)
     record_act(session, row, ActKind.SAFE_GAINS, by="", reason=new.statement or "registered", asked=gains)
     return vehicle_view(row)
 
@@ -82,18 +95,6 @@ def _noting(refused: list[GainlineError]) -> Iterator[None]:
         yield
     except GainlineError as error:
         refused.append(error)
-
-
-def _raise_all(refused: list[GainlineError]) -> None:
-    """Raise the one error, or one InputError with the problems of all."""
-    if len(refused) == 1:
-        raise refused[0]
-    if refused:
-        raise InputError(
-            "The vehicle cannot be registered like this.",
-            problems=tuple(problem for error in refused for problem in error.problems),
-            hint="Correct the fields listed.",
-        )
 
 
 def _accepted_options(
@@ -132,12 +133,9 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
     vehicle.
     """
     row = repository.get_one(session, vehicle_id)
-    check_version(edit.version, row.version, row.name, _differences(row, edit))
-    _require_own(row)
-    require_may_command(row, context)
-    check_action(VEHICLE_ACTIONS, "edit", row.state, row.name)
-    require_idle(session, row)
-    by = require_not_controlled_by_other(row, context)
+    sent = edit.model_dump(exclude={"version", "statement"}, exclude_none=True)
+    differences = {field: (getattr(row, field), value) for field, value in sent.items()}
+    by = _require_editable(session, row, edit.version, differences, context)
     if edit.options is not None:
         _set_options(session, row, edit.options, context, by=by)
     if edit.safe_gains is not None:
@@ -180,13 +178,26 @@ def promote_gains(
     session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, context: RequestContext
 ) -> None:
     """Make flown gains the safe gains. Raises ConflictError as `edit_vehicle` does."""
-    check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
+    by = _require_editable(session, row, version, {"safe_gains": (row.safe_gains, dict(gains))}, context)
+    _set_safe_gains(session, row, gains, statement=reason, by=by)
+    row.version += 1
+
+
+def _require_editable(
+    session: Session,
+    row: VehicleRow,
+    version: int,
+    differences: Mapping[str, tuple[object, object]],
+    context: RequestContext,
+) -> str:
+    """Return the operator of a change of a registered vehicle, as last read in that version. Raises ConflictError,
+    BusyError or NotAllowedError as `edit_vehicle` does."""
+    check_version(version, row.version, row.name, differences)
     _require_own(row)
     require_may_command(row, context)
     check_action(VEHICLE_ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
-    _set_safe_gains(session, row, gains, statement=reason, by=require_not_controlled_by_other(row, context))
-    row.version += 1
+    return require_not_controlled_by_other(row, context)
 
 
 def _require_own(row: VehicleRow) -> None:
@@ -194,11 +205,6 @@ def _require_own(row: VehicleRow) -> None:
         raise ConflictError(
             f"{row.name} is shared by all campaigns; its settings belong to each campaign.", hint="Edit the campaign."
         )
-
-
-def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, object]]:
-    sent = edit.model_dump(exclude={"version", "statement"}, exclude_none=True)
-    return {field: (getattr(row, field), value) for field, value in sent.items()}
 
 
 def _require_unlinked(row: VehicleRow, so: str) -> None:
@@ -310,16 +316,18 @@ def get_or_create_imported_vehicle(
         called = f"{name[:_ROOM]} (elsewhere{'' if number == 1 else f', {number}'})"
         known = repository.of_name_or_none(session, called)
         if known is None:
-            row = VehicleRow(
-                kind=IMPORT.name,
-                name=called,
-                title=IMPORT.title,
-                is_real=is_real,
-                options=origin,
-                safe_gains=dict(safe_gains),
-                state=VehicleState.DISCONNECTED,
+            return added(
+                session,
+                VehicleRow(
+                    kind=IMPORT.name,
+                    name=called,
+                    title=IMPORT.title,
+                    is_real=is_real,
+                    options=origin,
+                    safe_gains=dict(safe_gains),
+                    state=VehicleState.DISCONNECTED,
+                ),
             )
-            return added(session, row)
         if (known.kind, known.registered, known.is_real, known.options) == (IMPORT.name, False, is_real, origin):
             return known
     raise AssertionError("unreachable")

@@ -1,8 +1,8 @@
 """Queries on vehicles, their acts and their flights."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
-from typing import Final
+from typing import Final, TypeVar
 
 from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, tuple_, union_all
 from sqlalchemy.orm import Session
@@ -25,18 +25,16 @@ RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 Line = tuple[str, int]
 """A line of the ledger: its purpose and the id of its flight or act."""
 
+T = TypeVar("T", FlightRow, VehicleActRow)
+
 EVERY_VEHICLE: Final = select(VehicleRow)
 
 
 def get_one(session: Session, vehicle_id: int) -> VehicleRow:
     """The vehicle with that id. Raises NotFoundError."""
-    if (row := one_or_none(session, vehicle_id)) is None:
+    if (row := session.get(VehicleRow, vehicle_id)) is None:
         raise NotFoundError("vehicle", vehicle_id)
     return row
-
-
-def one_or_none(session: Session, vehicle_id: int) -> VehicleRow | None:
-    return session.get(VehicleRow, vehicle_id)
 
 
 def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
@@ -70,8 +68,7 @@ def get_act(session: Session, act_id: int) -> VehicleActRow:
 
 
 def act_under_way(session: Session, vehicle_id: int) -> VehicleActRow | None:
-    wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
-    return session.scalar(wanted.where(VehicleActRow.state.in_(ACTIVE_ACT_STATES)))
+    return session.scalar(acts_of(vehicle_id).where(VehicleActRow.state.in_(ACTIVE_ACT_STATES)))
 
 
 def acts_under_way(session: Session) -> Sequence[VehicleActRow]:
@@ -84,7 +81,7 @@ def first_requested_act(session: Session) -> VehicleActRow | None:
     return session.scalar(wanted.order_by(VehicleActRow.id).limit(1))
 
 
-def acts_wanted(vehicle_id: int) -> Select[VehicleActRow]:
+def acts_of(vehicle_id: int) -> Select[VehicleActRow]:
     return select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
 
 
@@ -132,12 +129,8 @@ def _is_left_with_its_gains() -> ColumnElement[bool]:
     )
 
 
-def flights_by_id(session: Session, ids: Sequence[int]) -> dict[int, FlightRow]:
-    return {row.id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(ids)))}
-
-
-def acts_by_id(session: Session, ids: Sequence[int]) -> dict[int, VehicleActRow]:
-    return {row.id: row for row in session.scalars(select(VehicleActRow).where(VehicleActRow.id.in_(ids)))}
+def rows_by_id(session: Session, kind: type[T], ids: Iterable[int]) -> dict[int, T]:
+    return {row.id: row for row in session.scalars(select(kind).where(kind.id.in_(ids)))}
 
 
 def campaign_names(session: Session, vehicle_id: int) -> Sequence[str]:
@@ -163,5 +156,5 @@ def has_taken_off(session: Session, vehicle_id: int, *, since: datetime) -> bool
 
 
 def safe_gains_acts(session: Session, vehicle_id: int) -> Sequence[VehicleActRow]:
-    wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
-    return session.scalars(wanted.where(VehicleActRow.kind == ActKind.SAFE_GAINS).order_by(VehicleActRow.id)).all()
+    wanted = acts_of(vehicle_id).where(VehicleActRow.kind == ActKind.SAFE_GAINS)
+    return session.scalars(wanted.order_by(VehicleActRow.id)).all()

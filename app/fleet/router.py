@@ -5,8 +5,7 @@ from typing import Literal
 from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
 
-from app.accounts import permissions
-from app.accounts.permissions import is_allowed
+from app.accounts.permissions import Permission, is_allowed
 from app.common.schemas import Page
 from app.common.states import ActKind
 from app.fleet import commands, control, registration, service, views
@@ -121,7 +120,7 @@ async def stop_motors(
 ) -> OrderAnswer:
     """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
     The database is read first only for a client that may not command real vehicles, to see whether this is one."""
-    if not is_allowed(permissions.Permission.STOP, asking.caller):
+    if not is_allowed(Permission.STOP, asking.caller):
         await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The command to stop the motors has been sent.")
 
@@ -135,7 +134,7 @@ async def _order(
     live: Live, vehicle_id: int, order: Literal["land", "motors off"], body: VehicleOrder | None, sentence: str
 ) -> OrderAnswer:
     reason = (body or VehicleOrder()).reason
-    if not live.worker_running:
+    if not live.client.connected:
         return OrderAnswer(accepted=False, sentence=NO_LINK)
     answer = await live.client.order(vehicle_id, order, reason)
     return OrderAnswer(accepted=answer.accepted, sentence=sentence if answer.accepted else answer.problem)

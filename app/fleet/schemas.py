@@ -9,9 +9,6 @@ from app.common.schemas import Gains, Name, Number, OptionValue, Reason, Request
 from app.common.states import ActKind, ActState, VehicleState
 from app.vehicles.base import CheckItem, Identity
 
-OrderReason = Annotated[str, Field(max_length=500)]
-Battery = Annotated[str, Field(max_length=60), Shown]
-
 
 class VehicleChoice(Request):
     """The vehicle of a campaign: a simulation by its kind with its settings, where an omitted one has its default, or a
@@ -59,7 +56,7 @@ class VehicleEdit(Request):
     version: Version
     name: Name | None = None
     options: dict[str, OptionValue] | None = None
-    battery: Battery | None = None
+    battery: Annotated[str, Field(max_length=60), Shown] | None = None
     safe_gains: Annotated[dict[str, Number], Field(max_length=50)] | None = None
     statement: Reason | None = None
 
@@ -134,16 +131,13 @@ class VehicleAct(Schema):
     finished_at: datetime | None
 
 
-Purpose = Literal["flight", "restore after flight", "connect", "restore", "release"]
-
-
 class GivenGains(Schema):
     """One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back.
 
     Nothing is sent when a vehicle is connected for the first time: `asked` is empty, and `read_back` what was found.
     """
 
-    purpose: Purpose
+    purpose: Literal["flight", "restore after flight", "connect", "restore", "release"]
     flight_id: int | None
     campaign_id: int | None
     trial_id: int | None
@@ -163,7 +157,7 @@ class Release(Request):
 class VehicleOrder(Request):
     """Reason for landing the vehicle, or stopping its motors, now; without one, it is the operator's request."""
 
-    reason: OrderReason = ""
+    reason: Annotated[str, Field(max_length=500)] = ""
 
 
 class OrderAnswer(Schema):

@@ -1,6 +1,7 @@
-"""Vehicles as campaigns and flights use them: which vehicle, and its state.
+"""Vehicles as campaigns and flights use them: which vehicle, what it can do, by its kind, and its state.
 
-Registration is in `registration`, requests beside flights in `commands`, operators' leases in `control`.
+Registration is in `registration`, requests beside flights in `commands`, operators' leases in `control`, what was
+asked of a vehicle in `views`.
 """
 
 from collections.abc import Mapping
@@ -10,33 +11,56 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.common.conflict_checks import check_action, check_transition
+from app.common.conflict_checks import allowed, check_action, check_transition
 from app.common.errors import BusyError, ConflictError, InputError, Problem
-from app.common.schemas import Page
+from app.common.schemas import OptionValue, Page
 from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, VehicleState
 from app.core.policy import Gains
 from app.db.base import added
-from app.db.models import VehicleRow
+from app.db.models import CampaignRow, VehicleRow
 from app.db.pages import Order, page_of
 from app.db.types import utc_now
 from app.figures.vehicle_wear import BatteryFlight
 from app.fleet import repository
-from app.fleet.schemas import Vehicle, VehicleChoice
-from app.fleet.views import (
-    campaign_vehicle,
-    can_fly,
-    experiments_of,
-    is_registered_one_by_one,
-    needs_staging,
-    options_of,
-    settings_of,
-    vehicle_view,
-)
+from app.fleet.control import control_of
+from app.fleet.schemas import CampaignVehicle, Vehicle, VehicleChoice
+from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
 
-__all__ = ["campaign_vehicle", "can_fly", "needs_staging", "options_of"]
+_OF_SHARED: Final = frozenset({"fly", "release"})
 
-_GAINS_NOT_READ_BACK: Final = "Its process ended before the safe gains were read back after the flight."
+
+def can_fly(row: VehicleRow) -> bool:
+    """Whether the program can fly it, rather than import records of flights flown elsewhere."""
+    kind = VEHICLE_KINDS.get(row.kind)
+    return kind is not None and kind.can_fly
+
+
+def experiments_of(row: VehicleRow) -> list[str]:
+    """Experiments whose gains the vehicle has; for a shared vehicle, all that its kind can fly."""
+    kind = VEHICLE_KINDS.get(row.kind)
+    if kind is None:
+        return []
+    return list(kind.experiments_with(row.options) if row.registered else kind.experiments)
+
+
+def settings_of(row: VehicleRow) -> dict[str, OptionValue]:
+    """The settings of a registered vehicle, with defaults filled in."""
+    kind = VEHICLE_KINDS.get(row.kind)
+    return dict(row.options) if kind is None else kind.completed(row.options)
+
+
+def is_registered_one_by_one(kind: VehicleKind) -> bool:
+    """Whether each vehicle of the kind has its own row, settings and link, rather than one shared by all campaigns.
+
+    True for kinds that include real vehicles and that the program flies.
+    """
+    return kind.is_real and kind.can_fly
+
+
+def needs_staging(row: VehicleRow) -> bool:
+    """Whether a person's own act is required between staging and takeoff: the vehicle is real and registered."""
+    return row.is_real and row.registered
 
 
 def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Gains) -> VehicleRow:
@@ -52,19 +76,21 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         raise _no_choice("id", "is missing: a vehicle of this kind must be registered first")
     if (known := repository.shared_of_kind_or_none(session, choice.kind)) is not None:
         return known
-    row = VehicleRow(
-        kind=choice.kind,
-        name=described.title,
-        title=described.title,
-        is_real=described.is_real,
-        safe_gains=dict(default_gains),
-        state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
+    return added(
+        session,
+        VehicleRow(
+            kind=choice.kind,
+            name=described.title,
+            title=described.title,
+            is_real=described.is_real,
+            safe_gains=dict(default_gains),
+            state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
+        ),
     )
-    return added(session, row)
 
 
 def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, default_gains: Gains) -> VehicleRow:
-    row = repository.one_or_none(session, vehicle_id)
+    row = session.get(VehicleRow, vehicle_id)
     if row is None or not row.registered:
         raise _no_choice("id", f"there is no registered vehicle {vehicle_id}")
     if row.kind != choice.kind:
@@ -99,7 +125,7 @@ def registered_for(session: Session, experiment: str, vehicle_id: int | None) ->
     """The registered vehicle with that id; without one, the only registered one that flies an experiment. Raises
     InputError when there is none, or there are several."""
     if vehicle_id is not None:
-        row = repository.one_or_none(session, vehicle_id)
+        row = session.get(VehicleRow, vehicle_id)
         if row is None:
             raise _no_vehicle(f"{vehicle_id} is not registered", hint="Choose a registered vehicle.")
         return VehicleChoice(kind=row.kind, id=row.id)
@@ -203,9 +229,11 @@ def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
 
 
 def doubt_gains(row: VehicleRow) -> None:
-    """Quarantine a vehicle after a flight that ended without a report of its gains."""
-    row.held = row.held_at = None
-    set_state_after_flight(row, concern=_GAINS_NOT_READ_BACK)
+    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored. A
+    simulated vehicle starts afresh with every flight."""
+    if row.is_real:
+        row.held = row.held_at = None
+        set_state_after_flight(row, concern="Its process ended before the safe gains were read back after the flight.")
 
 
 def is_classed_automatically(row: VehicleRow) -> bool:
@@ -213,13 +241,54 @@ def is_classed_automatically(row: VehicleRow) -> bool:
     return not row.is_real or not can_fly(row)
 
 
+def is_linked_or_wanted(row: VehicleRow) -> bool:
+    return row.state != VehicleState.DISCONNECTED or row.wanted_connected
+
+
+def _actions(row: VehicleRow) -> list[str]:
+    possible = allowed(VEHICLE_ACTIONS, row.state)
+    if not row.registered:
+        possible = [action for action in possible if action in _OF_SHARED]
+    impossible = set() if can_fly(row) else {"fly", "stage"}
+    if needs_staging(row):
+        impossible.add("fly")
+    if not is_linked_or_wanted(row):
+        impossible.add("disconnect")
+    if is_linked_or_wanted(row) or row.concern:
+        impossible |= {"configure", "delete"}
+    return [action for action in possible if action not in impossible]
+
+
+def vehicle_view(row: VehicleRow) -> Vehicle:
+    return Vehicle.view_of(
+        row,
+        can_fly=can_fly(row),
+        experiments=experiments_of(row),
+        options=settings_of(row) if row.registered else row.options,
+        control=control_of(row),
+        actions=_actions(row),
+    )
+
+
+def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
+    """A campaign's vehicle with its settings."""
+    vehicle = row.vehicle
+    return CampaignVehicle.view_of(
+        vehicle, can_fly=can_fly(vehicle), needs_staging=needs_staging(vehicle), options=options_of(row)
+    )
+
+
+def options_of(row: CampaignRow) -> dict[str, OptionValue]:
+    """The settings that a campaign flies with: a registered vehicle's own, else the campaign's."""
+    return settings_of(row.vehicle) if row.vehicle.registered else dict(row.vehicle_options)
+
+
 def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[Vehicle]:
     """Page of vehicles in the order in which they were registered or first used."""
-    order = Order("id", VehicleRow.id.expression)
     return page_of(
         session,
         repository.EVERY_VEHICLE,
-        order,
+        Order("id", VehicleRow.id.expression),
         cursor=cursor,
         limit=limit,
         view=lambda rows: [vehicle_view(row) for row in rows],

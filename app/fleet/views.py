@@ -1,4 +1,4 @@
-"""API views of vehicles, their acts and their gain history; what a vehicle can do, by its kind."""
+"""API views of what was asked of a vehicle: its acts, and its gain history."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -6,94 +6,29 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.common.conflict_checks import allowed
-from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
+from app.common.schemas import Page, decode_cursor, encode_cursor
 from app.common.states import (
     ACTIVE_ACT_STATES,
     ACTIVE_FLIGHT_STATES,
     FLIGHT_COMMANDS,
     FLOWN_FLIGHT_STATES,
-    VEHICLE_ACTIONS,
     ActKind,
     ActState,
     FlightState,
     TrialState,
-    VehicleState,
 )
-from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
+from app.db.models import FlightRow, VehicleActRow, VehicleRow
 from app.db.pages import Order, page_of
 from app.fleet import repository
-from app.fleet.control import control_of
-from app.fleet.schemas import CampaignVehicle, GivenGains, Vehicle, VehicleAct
+from app.fleet.schemas import GivenGains, VehicleAct
 from app.vehicles.end_texts import end_text
-from app.vehicles.kinds import VehicleKind
-from app.vehicles.registry import VEHICLE_KINDS
 
-
-def can_fly(row: VehicleRow) -> bool:
-    """Whether the program can fly it, rather than import records of flights flown elsewhere."""
-    kind = VEHICLE_KINDS.get(row.kind)
-    return kind is not None and kind.can_fly
-
-
-def experiments_of(row: VehicleRow) -> list[str]:
-    """Experiments whose gains the vehicle has; for a shared vehicle, all that its kind can fly."""
-    kind = VEHICLE_KINDS.get(row.kind)
-    if kind is None:
-        return []
-    return list(kind.experiments_with(row.options) if row.registered else kind.experiments)
-
-
-def settings_of(row: VehicleRow) -> dict[str, OptionValue]:
-    """The settings of a registered vehicle, with defaults filled in."""
-    kind = VEHICLE_KINDS.get(row.kind)
-    return dict(row.options) if kind is None else kind.completed(row.options)
-
-
-def is_registered_one_by_one(kind: VehicleKind) -> bool:
-    """Whether each vehicle of the kind has its own row, settings and link, rather than one shared by all campaigns.
-
-    True for kinds that include real vehicles and that the program flies.
-    """
-    return kind.is_real and kind.can_fly
-
-
-def needs_staging(row: VehicleRow) -> bool:
-    """Whether a person's own act is required between staging and takeoff: the vehicle is real and registered."""
-    return row.is_real and row.registered
-
-
-_OF_SHARED: Final = frozenset({"fly", "release"})
 _NEWEST_FIRST: Final = "-at"
 
 
-def vehicle_view(row: VehicleRow) -> Vehicle:
-    return Vehicle.view_of(
-        row,
-        can_fly=can_fly(row),
-        experiments=experiments_of(row),
-        options=settings_of(row) if row.registered else row.options,
-        control=control_of(row),
-        actions=_actions(row),
-    )
-
-
-def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
-    """A campaign's vehicle with its settings."""
-    vehicle = row.vehicle
-    return CampaignVehicle.view_of(
-        vehicle, can_fly=can_fly(vehicle), needs_staging=needs_staging(vehicle), options=options_of(row)
-    )
-
-
-def options_of(row: CampaignRow) -> dict[str, OptionValue]:
-    """The settings that a campaign flies with: a registered vehicle's own, else the campaign's."""
-    return settings_of(row.vehicle) if row.vehicle.registered else dict(row.vehicle_options)
-
-
-def act_view(row: VehicleActRow, flight: FlightRow | None = None) -> VehicleAct:
+def _act_view(row: VehicleActRow, flight: FlightRow | None) -> VehicleAct:
     """The act; with the flight that it is a command of, its outcome follows from that of the flight."""
-    act = VehicleAct.model_validate(row, from_attributes=True)
+    act = VehicleAct.view_of(row)
     if flight is None:
         return act
     state, problem = _command_outcome(row.kind, flight)
@@ -127,15 +62,20 @@ def _flight_id(row: VehicleActRow) -> int | None:
 def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
     """Page of acts, newest first. Raises NotFoundError."""
     repository.get_one(session, vehicle_id)
-    order = Order("-id", VehicleActRow.id.expression, descending=True)
-    wanted, view = repository.acts_wanted(vehicle_id), partial(_act_views, session)
-    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=view)
+    return page_of(
+        session,
+        repository.acts_of(vehicle_id),
+        Order("-id", VehicleActRow.id.expression, descending=True),
+        cursor=cursor,
+        limit=limit,
+        view=partial(_act_views, session),
+    )
 
 
 def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleAct]:
     of_flights = {row.id: flight_id for row in rows if (flight_id := _flight_id(row)) is not None}
-    flights = repository.flights_by_id(session, list(of_flights.values()))
-    return [act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
+    flights = repository.rows_by_id(session, FlightRow, of_flights.values())
+    return [_act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
 
 
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
@@ -145,8 +85,8 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
     found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
     shown = [line for line, _ in found[:limit]]
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
-    flights = repository.flights_by_id(session, [identity for purpose, identity in shown if purpose in of_flights])
-    acts = repository.acts_by_id(session, [identity for purpose, identity in shown if purpose not in of_flights])
+    flights = repository.rows_by_id(session, FlightRow, [id_ for purpose, id_ in shown if purpose in of_flights])
+    acts = repository.rows_by_id(session, VehicleActRow, [id_ for purpose, id_ in shown if purpose not in of_flights])
     items = []
     for purpose, identity in shown:
         if purpose == "flight":
@@ -157,24 +97,6 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
             items.append(_of_act(acts[identity]))
     following = encode_cursor(_NEWEST_FIRST, found[limit - 1][1]) if len(found) > limit else None
     return Page(items=items, total=total, next_cursor=following)
-
-
-def is_linked_or_wanted(row: VehicleRow) -> bool:
-    return row.state != VehicleState.DISCONNECTED or row.wanted_connected
-
-
-def _actions(row: VehicleRow) -> list[str]:
-    possible = allowed(VEHICLE_ACTIONS, row.state)
-    if not row.registered:
-        possible = [action for action in possible if action in _OF_SHARED]
-    impossible = set() if can_fly(row) else {"fly", "stage"}
-    if needs_staging(row):
-        impossible.add("fly")
-    if not is_linked_or_wanted(row):
-        impossible.add("disconnect")
-    if is_linked_or_wanted(row) or row.concern:
-        impossible |= {"configure", "delete"}
-    return [action for action in possible if action not in impossible]
 
 
 def _of_flight(row: FlightRow) -> GivenGains:

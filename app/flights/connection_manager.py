@@ -4,9 +4,9 @@ Land and motors off go from the socket's thread straight into a connection's pip
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, TypeVar
@@ -14,17 +14,21 @@ from typing import Final, TypeVar
 import structlog
 from sqlalchemy.orm import Session as Transaction
 
-from app.common.errors import ConflictError, StorageError
+from app.common.errors import ConflictError, GainlineError, StorageError
 from app.common.logging import say
 from app.common.states import GIVES_GAINS, ActKind
-from app.core.errors import GainlineError
 from app.fleet import commands
 from app.fleet.commands import ActTask
 from app.flights.connection_process import run_connection_process
-from app.flights.flight_commands import record_abort
 from app.flights.flight_process import RECONNECT_INTERVAL_S, VehicleConnection
-from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleResponse
-from app.flights.vehicle_status import status_time
+from app.flights.process_messages import (
+    CommandForwarded,
+    ConnectionOpened,
+    ConnectionRequest,
+    VehicleResponse,
+    status_time,
+)
+from app.flights.service import record_abort
 from app.flights.worker_part import WorkerPart
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError
@@ -101,7 +105,9 @@ class VehicleConnectionManager:
         A flight that waits for its takeoff stands down as well.
         """
         if (session := self._live(vehicle_id)) is None:
-            return _refused(NO_LINK)
+            refused: Future[str] = Future()
+            refused.set_result(NO_LINK)
+            return refused
         answer = session.send_command(order, words, by_s)
         if (trial_id := session.trial_id) is not None:
             self._part.abort_registry.abort(trial_id, StopRequest(words))
@@ -137,13 +143,9 @@ class VehicleConnectionManager:
                 self._fail(task, f"Internal error ({type(error).__name__}); see the worker's log.")
 
     def _connect(self, task: ActTask) -> None:
-        slot = self._slot(task.vehicle.vehicle_id)
         try:
-            self._acquire_slot(slot)
-            try:
+            with self._held_slot(task.vehicle.vehicle_id) as slot:
                 opened = self._open_connection(slot, task.vehicle)
-            finally:
-                slot.busy.release()
         except GainlineError as error:
             concern = str(error) if isinstance(error, SafeGainsError) else ""
             self._fail(
@@ -152,31 +154,41 @@ class VehicleConnectionManager:
                 also=lambda t: commands.record_disconnected(t, task.vehicle.vehicle_id, concern=concern),
             )
             return
-        self._store_with_retry(partial(_connected, task=task, opened=opened))
+        held = opened.held or None
+        self._store_with_retry(
+            lambda t: commands.finish_connect(t, task, opened.identity, concern=opened.concern, held=held)
+        )
 
     def _disconnect(self, task: ActTask) -> None:
         self._close(task.vehicle.vehicle_id)
-        self._store_with_retry(partial(_disconnected, task=task))
+
+        def store(transaction: Transaction) -> None:
+            commands.record_disconnected(transaction, task.vehicle.vehicle_id)
+            commands.finish_act(transaction, task.act_id)
+
+        self._store_with_retry(store)
 
     def _close(self, vehicle_id: int, *, only: VehicleConnection | None = None) -> None:
         """Close the vehicle's connection; with `only`, close it only if it is that one."""
-        slot = self._slot(vehicle_id)
-        self._acquire_slot(slot)
-        try:
+        with self._held_slot(vehicle_id) as slot:
             if only is not None and slot.session is not only:
                 return
             session, slot.session = slot.session, None
             if session is not None:
                 session.close()
-        finally:
-            slot.busy.release()
         self._publish_state(vehicle_id, "gone")
 
-    def _acquire_slot(self, slot: VehicleSlot) -> None:
-        """Acquire the slot for an act; closes a connection attempt that is holding it."""
+    @contextmanager
+    def _held_slot(self, vehicle_id: int) -> Iterator[VehicleSlot]:
+        """Hold the vehicle's slot for an act; closes a connection attempt that is holding it."""
+        slot = self._slot(vehicle_id)
         while not slot.busy.acquire(timeout=self._part.clock.wall_s(YIELD_POLL_S)):
             if (seeking := slot.reconnecting) is not None:
                 seeking.request_close()
+        try:
+            yield slot
+        finally:
+            slot.busy.release()
 
     def _ask(self, task: ActTask) -> None:
         try:
@@ -212,7 +224,12 @@ class VehicleConnectionManager:
         with self._part.database.read() as transaction:
             wanted = commands.list_vehicles_to_reconnect(transaction)
         for vehicle in wanted:
-            self._schedule_reconnect(vehicle)
+            slot = self._slot(vehicle.vehicle_id)
+            seeking = slot.reconnecting
+            if seeking is not None and seeking.call.vehicle.options != vehicle.options:
+                seeking.request_close()
+            if slot.session is None and seeking is None and slot.busy.acquire(blocking=False):
+                self._reconnect_executor.submit(self._reconnect, slot, vehicle)
 
     def _release_ended(self, vehicle_id: int, slot: VehicleSlot, gone: VehicleConnection) -> None:
         try:
@@ -223,14 +240,6 @@ class VehicleConnectionManager:
         if slot.session is gone:  # not one that was opened meanwhile
             slot.session = None
         self._publish_state(vehicle_id, "gone")
-
-    def _schedule_reconnect(self, vehicle: LinkedVehicle) -> None:
-        slot = self._slot(vehicle.vehicle_id)
-        seeking = slot.reconnecting
-        if seeking is not None and seeking.call.vehicle.options != vehicle.options:
-            seeking.request_close()
-        if slot.session is None and seeking is None and slot.busy.acquire(blocking=False):
-            self._reconnect_executor.submit(self._reconnect, slot, vehicle)
 
     def _reconnect(self, slot: VehicleSlot, vehicle: LinkedVehicle) -> None:
         """Connect a wanted vehicle, with `busy` held. Errors are logged only, because the next attempt follows
@@ -294,14 +303,14 @@ class VehicleConnectionManager:
             case VehicleStatus(concern=concern, restarts=restarts):
                 self._part.publish(news)
                 if slot.restarts is not None and restarts > slot.restarts:
-                    self._record_in_background(lambda t: commands.discard_checks(t, vehicle_id))
+                    self._record_in_background(lambda t: commands.record_checks(t, vehicle_id, None))
                 slot.restarts = restarts
                 if concern and concern != slot.concern:
                     self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern
-            case CommandForwarded(order=order, words=words, problem=problem):
-                kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
-                reason = words or REQUESTED_BY_OPERATOR
+            case CommandForwarded(command, problem):
+                kind = ActKind.MOTORS_OFF if command.order == "motors off" else ActKind.LAND
+                reason = command.words or REQUESTED_BY_OPERATOR
                 self._record_in_background(
                     lambda t: commands.record_command(t, vehicle_id, kind, reason, problem=problem)
                 )
@@ -330,15 +339,6 @@ class VehicleConnectionManager:
             return None
 
 
-def _connected(transaction: Transaction, task: ActTask, opened: ConnectionOpened) -> None:
-    commands.finish_connect(transaction, task, opened.identity, concern=opened.concern, held=opened.held or None)
-
-
-def _disconnected(transaction: Transaction, task: ActTask) -> None:
-    commands.record_disconnected(transaction, task.vehicle.vehicle_id)
-    commands.finish_act(transaction, task.act_id)
-
-
 def _answered(transaction: Transaction, task: ActTask, answered: VehicleResponse) -> None:
     vehicle_id = task.vehicle.vehicle_id
     result: dict[str, object] | None = None
@@ -355,12 +355,6 @@ def _answered(transaction: Transaction, task: ActTask, answered: VehicleResponse
         commands.pin_identity(transaction, vehicle_id, answered.identity)
     read_back = answered.held if task.kind in GIVES_GAINS and answered.held else None
     commands.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
-
-
-def _refused(problem: str) -> Future[str]:
-    refused: Future[str] = Future()
-    refused.set_result(problem)
-    return refused
 
 
 def _no_link_error() -> VehicleError:

@@ -7,21 +7,19 @@ are dropped when the worker does not read them, so that a flight never waits for
 import os
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import Final
 
 from app.common.data_folder import telemetry_log, trial_parameters_folder, vehicle_lock
 from app.common.states import ActKind
-from app.core.errors import GainlineError
 from app.flights.flight_loop import (
     FlightLoop,
     PipeClosedError,
     WorkerPipe,
     failure_from,
     hold_vehicle_lock,
-    internal_error,
 )
 from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S
 from app.flights.process_messages import (
@@ -30,14 +28,16 @@ from app.flights.process_messages import (
     ConnectionRequest,
     FlightRequest,
     SafeGainsRestored,
+    Staging,
     StagingLost,
     TakeOffCommand,
     ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
+    is_silent,
+    status_of,
 )
-from app.flights.vehicle_status import Staging, is_silent, status_of
 from app.live.messages import SILENT_AFTER_S, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
@@ -64,7 +64,6 @@ LOCK_TIMEOUT_S: Final = 120.0
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
 """How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
 lock."""
-_NOT_STOPPED: Final = "The vehicle has not confirmed that its motors stopped."
 _EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was notified."
 
 
@@ -73,23 +72,16 @@ def run_connection_process(pipe: Connection, call: ConnectionRequest) -> None:
     ignore_stop_signals()
     line = WorkerPipe(pipe)
     try:
-        with hold_vehicle_lock(
-            vehicle_lock(call.data_dir, call.vehicle.vehicle_id),
-            within_s=LOCK_TIMEOUT_S,
-            wanted=line.is_open,
-            clock=call.clock,
+        lock = vehicle_lock(call.data_dir, call.vehicle.vehicle_id)
+        with (
+            hold_vehicle_lock(lock, within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock),
+            closing(VehicleProcess(line, call)) as process,
         ):
-            process = VehicleProcess(line, call)
-            try:
-                process.run()
-            finally:
-                process.close()
+            process.run()
     except PipeClosedError:
         pass
-    except GainlineError as error:
-        line.send(failure_from(error))
     except Exception as error:  # noqa: BLE001 - outermost frame of the process; the worker's log has the error
-        line.send(internal_error(error))
+        line.send(failure_from(error))
     finally:
         pipe.close()
         os._exit(0)
@@ -115,12 +107,16 @@ class VehicleProcess(FlightLoop):
     def run(self) -> None:
         """Carry out requests one after another.
 
-        Raises PipeClosedError when the worker closes the pipe or dies, VehicleError when the link fails.
+        Raises PipeClosedError when the worker closes the pipe or dies, VehicleError when the link fails. After the
+        worker's end a land or motors off command is repeated until telemetry confirms it, for at most
+        STANDING_ORDER_TIMEOUT_S; not at all if it was already repeated that long without a packet from the vehicle.
         """
         try:
             super().run()
         except PipeClosedError:
-            self._finish_order()
+            until_s = self._clock.now_s() + STANDING_ORDER_TIMEOUT_S
+            while self._vehicle.has_standing_order and self._clock.now_s() < until_s:
+                self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             raise
 
     def _carry_out(self, asked: ToVehicleProcess) -> None:
@@ -128,13 +124,6 @@ class VehicleProcess(FlightLoop):
             self._line.send(self._act(asked))
         else:
             super()._carry_out(asked)
-
-    def _finish_order(self) -> None:
-        """Repeat a land or motors off command after the worker's end until telemetry confirms it, for at most
-        STANDING_ORDER_TIMEOUT_S; not at all if it was already repeated that long without a packet from the vehicle."""
-        until_s = self._clock.now_s() + STANDING_ORDER_TIMEOUT_S
-        while self._vehicle.has_standing_order and self._clock.now_s() < until_s:
-            self._vehicle.attend(POLL_INTERVAL_S * self._speed)
 
     def close(self) -> None:
         self._vehicle.close()
@@ -159,8 +148,11 @@ class VehicleProcess(FlightLoop):
         return connect(it.options, it.safe_gains, folder, it.identity, self._while_waiting, it.was_flying)
 
     def _next(self) -> ToVehicleProcess:
-        """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
-        while (message := self._poll_commands()) is None:
+        """Return the worker's next message that is not a command, which is forwarded at once; attend to the vehicle
+        meanwhile."""
+        while (message := self._line.receive()) is None or isinstance(message, VehicleCommand):
+            if message is not None:
+                self._forward_command(message)
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             if (status := self._publish_status()) is not None and self._staging in {"staged", "silent"}:
                 self._watch_staged(status)
@@ -192,14 +184,6 @@ class VehicleProcess(FlightLoop):
             except VehicleError as error:
                 self._staging = "lost"
                 self._line.send(StagingLost(str(error)))
-
-    def _poll_commands(self) -> ToVehicleProcess | None:
-        """Forward a command at once; return any other message."""
-        message = self._line.receive()
-        if not isinstance(message, VehicleCommand):
-            return message
-        self._forward_command(message)
-        return None
 
     def _while_waiting(self) -> None:
         """Callback of slow operations on the ground: forwards a command at once, which interrupts the operation.
@@ -246,14 +230,15 @@ class VehicleProcess(FlightLoop):
     def _report(self, ordered: VehicleCommand, problem: str = "") -> None:
         """Report a command that was forwarded to the vehicle, which must confirm that its motors have stopped."""
         is_awaited = ordered.order == "motors off" and not problem
-        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, problem, is_awaited)
+        forwarded = CommandForwarded(ordered, problem, is_awaited)
         self._line.send(forwarded)
         self._stops += [forwarded] * is_awaited
 
     def _report_stops(self) -> None:
         if self._stops and (has_stopped := self._vehicle.has_stopped) is not None:
+            problem = "" if has_stopped else "The vehicle has not confirmed that its motors stopped."
             for each in self._stops:
-                self._line.send(replace(each, problem="" if has_stopped else _NOT_STOPPED, is_awaited=False))
+                self._line.send(replace(each, problem=problem, is_awaited=False))
             self._stops.clear()
 
     def _publish_status(self) -> VehicleStatus | None:
@@ -273,6 +258,7 @@ class VehicleProcess(FlightLoop):
     # ---- acts
 
     def _act(self, asked: VehicleRequest) -> VehicleResponse:
+        checks, parameters = None, None
         try:
             if self._vehicle.condition().armed:  # a slow operation would delay Land
                 raise VehicleError(
@@ -280,26 +266,21 @@ class VehicleProcess(FlightLoop):
                 )
             self._require_safe_gains(asked.safe_gains)
             with self._interruptible():
-                answer = self._perform(asked.kind)
+                match asked.kind:
+                    case ActKind.CHECK:
+                        checks = self._vehicle.check()
+                    case ActKind.PARAMETERS:
+                        parameters = self._vehicle.parameters()
+                    case ActKind.RESTORE:
+                        self._vehicle.restore()
+                    case ActKind.RELEASE:
+                        self._vehicle.release()
+                    case kind:
+                        raise VehicleError(
+                            f"A vehicle connection cannot execute “{kind}”.", hint="Report this with the worker's log."
+                        )
         except VehicleError as error:
             return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
-        return answer
-
-    def _perform(self, kind: ActKind) -> VehicleResponse:
-        checks, parameters = None, None
-        match kind:
-            case ActKind.CHECK:
-                checks = self._vehicle.check()
-            case ActKind.PARAMETERS:
-                parameters = self._vehicle.parameters()
-            case ActKind.RESTORE:
-                self._vehicle.restore()
-            case ActKind.RELEASE:
-                self._vehicle.release()
-            case _:
-                raise VehicleError(
-                    f"A vehicle connection cannot execute “{kind}”.", hint="Report this with the worker's log."
-                )
         return VehicleResponse(
             concern=self._vehicle.concern,
             held=self._held(),

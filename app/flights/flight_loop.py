@@ -9,7 +9,7 @@ import os
 import select
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -34,8 +34,7 @@ from app.flights.process_messages import (
     VehicleCommand,
 )
 from app.live.messages import FlightPhase, Telemetry
-from app.processes import ignore_stop_signals
-from app.processes.locks import LockedError, exclusive
+from app.processes import LockedError, exclusive, ignore_stop_signals
 from app.vehicles.base import (
     FlightRecord,
     SafeGainsError,
@@ -138,22 +137,18 @@ class FlightLoop(ABC):
         self._trial_id, self._stop = request.trial_id, None
         try:
             with self._vehicle_for(request) as vehicle:
-                self._line.send(GainsStaged(self._stage(vehicle, request.gains)))
+                with self._interruptible():
+                    read_back = vehicle.stage(request.gains)
+                self._line.send(GainsStaged(read_back))
                 if (cleared := self._await_takeoff_clearance()) is not None:
                     self._line.send(FlightLanded(self._take_off(vehicle, request, cleared)))
-        except GainlineError as error:
-            self._line.send(failure_from(error))
         except PipeClosedError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
-            self._line.send(internal_error(error))
+            self._line.send(failure_from(error))
         finally:
             self._trial_id = None
         self._line.send(FlightFinished())
-
-    def _stage(self, vehicle: Vehicle, gains: Mapping[str, float]) -> dict[str, float]:
-        with self._interruptible():
-            return vehicle.stage(gains)
 
     def _interruptible(self) -> AbstractContextManager[None]:
         """Context that a command for the vehicle interrupts; a simulation gets none."""
@@ -227,11 +222,13 @@ def run_simulations(pipe: Connection, data_dir: Path, clock: Clock) -> None:
         os._exit(0)
 
 
-def failure_from(error: GainlineError) -> FlightFailure:
-    """Build the failure message of an error.
+def failure_from(error: Exception) -> FlightFailure:
+    """Build the failure message of an error, also of an internal one, so that the trial gets a definite end.
 
     If the error followed from a refusal to fly, the refusal comes first.
     """
+    if not isinstance(error, GainlineError):
+        return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
     refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
     what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
     return FlightFailure(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
@@ -242,11 +239,6 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
     while error is not None:
         yield error
         error = error.__context__
-
-
-def internal_error(error: Exception) -> FlightFailure:
-    """Failure message of an internal error, so that the trial gets a definite end."""
-    return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
 
 
 @contextmanager
@@ -278,8 +270,7 @@ class FlightMonitor:
     """
 
     def __init__(self, request: FlightRequest, show: Callable[[Telemetry], None], clock: Clock) -> None:
-        self._campaign_id = request.campaign_id
-        self._trial_id = request.trial_id
+        self._request = request
         self._experiment = request.configured_experiment
         self._columns: list[str] = []
         self._scored_from_s = self._experiment.scored_from_s
@@ -294,8 +285,11 @@ class FlightMonitor:
     def sample(self, sample: Sample) -> None:
         output = self._experiment.output
         target = self._target(sample)
-        if target is not None:
-            self._score(sample.time_s, abs(target - sample[output]))
+        if target is not None and self._scored_from_s <= sample.time_s <= self._scored_until_s:
+            deviation = abs(target - sample[output])
+            before_s, before = self._last if self._last is not None else (self._scored_from_s, deviation)
+            self._integral += (sample.time_s - before_s) * (before + deviation) / 2.0
+            self._last = (sample.time_s, deviation)
         others = [name for name in sample.channels if name != output]
         if (columns := ["time_s", output, *others]) != self._columns:  # a vehicle may report more from some time on
             self.flush()
@@ -312,8 +306,8 @@ class FlightMonitor:
             rows, self._rows = self._rows, []
             self._show(
                 Telemetry(
-                    campaign_id=self._campaign_id,
-                    trial_id=self._trial_id,
+                    campaign_id=self._request.campaign_id,
+                    trial_id=self._request.trial_id,
                     time_s=rows[-1][0],
                     columns=self._columns,
                     samples=rows,
@@ -334,9 +328,3 @@ class FlightMonitor:
         if channel is not None:
             return sample.channels.get(channel)
         return float(self._experiment.set_point(np.array([sample.time_s]))[0])
-
-    def _score(self, time_s: float, deviation: float) -> None:
-        if self._scored_from_s <= time_s <= self._scored_until_s:
-            before_s, before = self._last if self._last is not None else (self._scored_from_s, deviation)
-            self._integral += (time_s - before_s) * (before + deviation) / 2.0
-            self._last = (time_s, deviation)

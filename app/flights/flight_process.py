@@ -45,18 +45,13 @@ from app.flights.process_messages import (
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
+    status_time,
 )
-from app.flights.vehicle_status import status_time
 from app.live.messages import NO_LINK, SILENT_AFTER_S, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
 from app.vehicles.base import SafeGainsError, VehicleError
 from app.vehicles.flight_end import StopRequest
 
-_ENDED: Final = (
-    "The process that had the vehicle's link ended; it is unknown whether the command was sent. Use the vehicle's "
-    "own remote control now."
-)
-_UNCONFIRMED: Final = "The process that had the vehicle's link ended before the vehicle confirmed it."
 NOT_ANSWERING: Final = (
     "Gainline's connection to the vehicle is not responding: commands do not reach the vehicle. If it is flying, use "
     "its own remote control now."
@@ -67,9 +62,6 @@ RECONNECT_INTERVAL_S: Final = 2.0
 """How often a vehicle that is wanted connected is looked for."""
 TAKE_OFF_TIMEOUT_S: Final = 2.0
 """A takeoff later than this after the operator's request would surprise the operator."""
-
-
-MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 
 
 class FlightProcess:
@@ -90,10 +82,6 @@ class FlightProcess:
     @property
     def alive(self) -> bool:
         return self._child.alive
-
-    @property
-    def pid(self) -> int | None:
-        return self._child.pid
 
     def fly(self, request: FlightRequest, publish: Publish) -> Iterator[FlightMessage]:
         """Send the request, publish telemetry and phases, and yield the other messages until the process is free again.
@@ -139,29 +127,28 @@ class FlightProcess:
     def _post(self, message: ToVehicleProcess) -> bool:
         try:
             with self._sending:
-                self._child.send(message)
+                self._child.pipe.send(message)
         except OSError:  # the process is dead: `_next` says so
             return False
         return True
 
 
 class FlightProcessPool:
-    """Pool of idle processes for simulations, with everything imported. Thread-safe."""
+    """Pool of processes for simulations, of which one idle is kept, with everything imported. Thread-safe."""
 
-    def __init__(self, data_dir: Path, clock: Clock = REAL_TIME, *, spare: int = 1) -> None:
+    def __init__(self, data_dir: Path, clock: Clock = REAL_TIME) -> None:
         self._start = partial(FlightProcess, run_simulations, data_dir, clock, name="flight")
-        self._spare = spare
         self._lock = threading.Lock()
-        self._waiting = [self._start() for _ in range(spare)]
+        self._waiting = [self._start()]
 
     def acquire(self) -> FlightProcess:
         with self._lock:
             return self._waiting.pop() if self._waiting else self._start()
 
     def release(self, process: FlightProcess) -> None:
-        """Return a free process to the pool; it is closed when the pool is full."""
+        """Return a free process to the pool; it is closed when another one is idle."""
         with self._lock:
-            if len(self._waiting) < self._spare:
+            if not self._waiting:
                 self._waiting.append(process)
                 return
         process.close()
@@ -184,7 +171,11 @@ class VehicleConnection(FlightProcess):
     _take_off_timeout_s = TAKE_OFF_TIMEOUT_S
 
     def __init__(
-        self, call: ConnectionRequest, run: Callable[[Connection, ConnectionRequest], None], *, hear: MessageHandler
+        self,
+        call: ConnectionRequest,
+        run: Callable[[Connection, ConnectionRequest], None],
+        *,
+        hear: Callable[[VehicleStatus | CommandForwarded], None],
     ) -> None:
         super().__init__(run, call, name=f"session {call.vehicle.name}")
         self.call: Final = call
@@ -248,16 +239,22 @@ class VehicleConnection(FlightProcess):
             answer.set_result(problem)
 
     def _note_forwarded(self, forwarded: CommandForwarded) -> None:
-        self._answer_order(forwarded.number, forwarded.problem)
-        self._awaited[forwarded.number] = forwarded
+        number = forwarded.command.number
+        self._answer_order(number, forwarded.problem)
+        self._awaited[number] = forwarded
         if not forwarded.is_awaited:
-            self._hear_of(self._awaited.pop(forwarded.number))
+            self._hear_of(self._awaited.pop(number))
 
     def _end_orders(self) -> None:
         for number in tuple(self._orders):
-            self._answer_order(number, _ENDED)
+            self._answer_order(
+                number,
+                "The process that had the vehicle's link ended; it is unknown whether the command was sent. Use the "
+                "vehicle's own remote control now.",
+            )
+        unconfirmed = "The process that had the vehicle's link ended before the vehicle confirmed it."
         for forwarded in self._awaited.values():
-            self._hear_of(replace(forwarded, problem=_UNCONFIRMED, is_awaited=False))
+            self._hear_of(replace(forwarded, problem=unconfirmed, is_awaited=False))
 
     def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""

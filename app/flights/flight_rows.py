@@ -36,9 +36,6 @@ from app.vehicles.flight_end import FlightEnd, GainsLeft, Landing, Requester, St
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
-_NO_RECORD: Final = "its process ended without a record"
-_WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "the worker stopped before lift-off"}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOutcome:
@@ -65,7 +62,7 @@ class FlightOutcome:
         if self.record is not None:
             return self.record.end
         if self.lifted_off:
-            return FlightEnd(remarks=(self.problem or _NO_RECORD,), landed=Landing.UNKNOWN)
+            return FlightEnd(remarks=(self.problem or "its process ended without a record",), landed=Landing.UNKNOWN)
         return self.end or not_begun(self.problem)
 
     def gains_left(self, end: FlightEnd, safe_gains: Mapping[str, float] | None) -> FlightEnd:
@@ -119,19 +116,21 @@ def _first_requested(session: Session) -> FlightRow | None:
 def add_flight(session: Session, trial_id: int, *, mode: FlightMode, speed: float | None) -> FlightRow:
     """Add the request that a vehicle flies a trial's gains, with the label of its battery. Raises NotFoundError."""
     trial, now = trial_row(session, trial_id), utc_now()
-    flight = FlightRow(
-        campaign_id=trial.campaign_id,
-        trial_id=trial_id,
-        vehicle_id=trial.campaign.vehicle_id,
-        state=FlightState.REQUESTED,
-        mode=mode,
-        gains=trial.gains,
-        speed=speed,
-        battery=trial.campaign.vehicle.battery,
-        requested_at=now,
-        take_off_at=now if mode == "fly" else None,
+    return added(
+        session,
+        FlightRow(
+            campaign_id=trial.campaign_id,
+            trial_id=trial_id,
+            vehicle_id=trial.campaign.vehicle_id,
+            state=FlightState.REQUESTED,
+            mode=mode,
+            gains=trial.gains,
+            speed=speed,
+            battery=trial.campaign.vehicle.battery,
+            requested_at=now,
+            take_off_at=now if mode == "fly" else None,
+        ),
     )
-    return added(session, flight)
 
 
 def claim_flight(session: Session, worker: str) -> FlightRequest | None:
@@ -141,7 +140,24 @@ def claim_flight(session: Session, worker: str) -> FlightRequest | None:
     """
     while (flight := _first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
-            return _claimed(flight, worker)
+            set_flight_state(flight, FlightState.RUNNING)
+            flight.worker, flight.claimed_at = worker, utc_now()
+            flight.safe_gains = dict(flight.vehicle.safe_gains)
+            return FlightRequest(
+                flight_id=flight.id,
+                trial_id=flight.trial_id,
+                campaign_id=flight.campaign_id,
+                experiment=flight.campaign.experiment,
+                experiment_options=flight.campaign.definition["experiment_options"],
+                vehicle_id=flight.vehicle_id,
+                vehicle_kind=flight.vehicle.kind,
+                vehicle_options=fleet.options_of(flight.campaign),
+                safe_gains=dict(flight.safe_gains),
+                gains=dict(flight.gains),
+                seed=flight.trial.seed,
+                speed=flight.speed,
+                mode=flight.mode,
+            )
         _withdraw(flight, f"it could not be started within {REQUEST_TIMEOUT.total_seconds():g} s")
     return None
 
@@ -161,27 +177,6 @@ def _withdraw(flight: FlightRow, reason: str) -> None:
         flight,
         FlightState.CANCELLED,
         end=not_begun(f"The flight was not started: {reason}. Request it again if it is still needed."),
-    )
-
-
-def _claimed(flight: FlightRow, worker: str) -> FlightRequest:
-    set_flight_state(flight, FlightState.RUNNING)
-    flight.worker, flight.claimed_at = worker, utc_now()
-    flight.safe_gains = dict(flight.vehicle.safe_gains)
-    return FlightRequest(
-        flight_id=flight.id,
-        trial_id=flight.trial_id,
-        campaign_id=flight.campaign_id,
-        experiment=flight.campaign.experiment,
-        experiment_options=flight.campaign.definition["experiment_options"],
-        vehicle_id=flight.vehicle_id,
-        vehicle_kind=flight.vehicle.kind,
-        vehicle_options=fleet.options_of(flight.campaign),
-        safe_gains=dict(flight.safe_gains),
-        gains=dict(flight.gains),
-        seed=flight.trial.seed,
-        speed=flight.speed,
-        mode=flight.mode,
     )
 
 
@@ -241,9 +236,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     trial = flight.trial
     may_take_off, stands_down = _clearance(flight)
     if not may_take_off:
-        why = "its takeoff has not been requested"
-        if stands_down is not None:
-            why = end_text(stands_down.ended)
+        why = "its takeoff has not been requested" if stands_down is None else end_text(stands_down.ended)
         raise ConflictError(
             f"Flight {trial.number} cannot be flown: {why}.", hint="Stage it again if it is still needed."
         )
@@ -295,11 +288,12 @@ def lose_running_flights(session: Session) -> list[int]:
 
     Those in the air are lost; the trials of those only staged are planned again. Returns the ids of the lost trials.
     """
-    return [
-        flight.trial_id
-        for flight in session.scalars(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all()
-        if _give_up(session, flight, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
-    ]
+    lost = []
+    for flight in session.scalars(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all():
+        when = "during the flight" if flight.trial.state == TrialState.FLYING else "before lift-off"
+        if _give_up(session, flight, f"the worker stopped {when}"):
+            lost.append(flight.trial_id)
+    return lost
 
 
 def recover_record(session: Session, flight_id: int, record: FlightRecord) -> None:
@@ -325,7 +319,7 @@ def _lose(session: Session, flight: FlightRow, end: FlightEnd) -> None:
     set_trial_state(flight.trial, TrialState.LOST, reason="")
     flight.trial.end = end
     _end(flight, FlightState.LOST, end)
-    _doubt_vehicle(flight)
+    fleet.doubt_gains(flight.vehicle)
     proposals.finish_flying(session, flight.campaign)
 
 
@@ -347,7 +341,7 @@ def _give_up(session: Session, flight: FlightRow, problem: str) -> bool:
             _lose(session, flight, FlightEnd(remarks=(problem,), landed=Landing.UNKNOWN))
         else:
             _end_unflown(session, flight, FlightState.FAILED, not_begun(problem))
-    _doubt_vehicle(flight)
+    fleet.doubt_gains(flight.vehicle)
     return lifted_off
 
 
@@ -355,15 +349,6 @@ def _record_doubts(flight: FlightRow, outcome: FlightOutcome) -> None:
     if outcome.concern:
         fleet.set_state_after_flight(flight.vehicle, concern=outcome.concern)
     elif outcome.unheard:
-        _doubt_vehicle(flight)
-
-
-def _doubt_vehicle(flight: FlightRow) -> None:
-    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored.
-
-    A simulated vehicle starts afresh with every flight.
-    """
-    if flight.vehicle.is_real:
         fleet.doubt_gains(flight.vehicle)
 
 

@@ -1,4 +1,5 @@
-"""Messages between the worker and a process that flies a vehicle, whichever kind of process that is.
+"""Messages between the worker and a process that flies a vehicle, whichever kind of process that is; one of them is the
+vehicle's status, with its readiness for the flight that it waits for.
 
     worker    FlightRequest →             → TakeOffCommand | CancelTakeOff →
     process                   GainsStaged →   Telemetry … FlightLanded → SafeGainsRestored → FlightFinished
@@ -6,16 +7,35 @@
 `CancelFlight` may come at any moment; `FlightFailure` takes the place of the messages that do not come.
 """
 
+import datetime as dt
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Final, Literal
 
 from app.autopilots.registry import get_experiment
 from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
-from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
-from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, LinkedVehicle, OptionValue
+from app.live.messages import (
+    SILENT_AFTER_S,
+    FlightPhase,
+    PublishedMessage,
+    Telemetry,
+    UnreadyReason,
+    VehicleCommandKind,
+    VehicleStatus,
+)
+from app.vehicles.base import (
+    CheckItem,
+    Condition,
+    ConnectedVehicle,
+    FlightOptions,
+    FlightRecord,
+    Identity,
+    LinkedVehicle,
+    OptionValue,
+)
 from app.vehicles.flight_end import StopRequest
 
 
@@ -173,7 +193,7 @@ class VehicleCommand:
     """To the process, at any moment: land, or motors off.
 
     `words` are those of who asked, if any. Not to be carried out after `by_s` of this computer's monotonic clock, s.
-    The answer carries the same `number`.
+    `number` tells the commands of a connection apart.
     """
 
     number: int
@@ -187,9 +207,7 @@ class CommandForwarded:
     """From the process: a command was forwarded to the vehicle; `problem` when it could not be, or when the vehicle did
     not confirm it. `is_awaited`: another such message tells whether the vehicle has confirmed it."""
 
-    number: int
-    order: VehicleCommandKind
-    words: str
+    command: VehicleCommand
     problem: str = ""
     is_awaited: bool = False
 
@@ -198,3 +216,52 @@ FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | Veh
 ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
 
 Publish = Callable[[PublishedMessage], None]
+
+Staging = Literal["none", "staged", "silent", "lost"]
+"""Of the flight that waits for its takeoff: nothing staged, the staged gains read back, a silence since then, or the
+gains no longer on the vehicle."""
+
+LOST_AFTER_S: Final = 3.0
+"""A vehicle without a heartbeat for this long is shown as gone."""
+
+
+def status_of(vehicle_id: int, vehicle: ConnectedVehicle, staging: Staging, *, speed: float) -> VehicleStatus:
+    """The vehicle's status now, its ages in the time of the ground; `speed` is that of its clock."""
+    known = vehicle.condition()
+    age_s = _in_ground_time(known.heartbeat_age_s, speed)
+    condition = replace(
+        known,
+        packet_age_s=_in_ground_time(known.packet_age_s, speed),
+        heartbeat_age_s=age_s,
+        said_age_s=_in_ground_time(known.said_age_s, speed),
+        held=dict(known.held),
+    )
+    return VehicleStatus(
+        vehicle_id=vehicle_id,
+        state="gone" if age_s is None or age_s > LOST_AFTER_S else "connected",
+        at=status_time(),
+        concern=vehicle.concern,
+        unready=_unready(condition, staging),
+        **asdict(condition),
+    )
+
+
+def is_silent(condition: Condition) -> bool:
+    """Whether nothing was received from the vehicle for long."""
+    return condition.packet_age_s is None or condition.packet_age_s > SILENT_AFTER_S
+
+
+def status_time() -> str:
+    """The present time as a VehicleStatus has it."""
+    return dt.datetime.now(dt.UTC).isoformat()
+
+
+def _unready(condition: Condition, staging: Staging) -> UnreadyReason:
+    is_blind = staging == "staged" and not condition.position_hz
+    if staging == "silent" or is_blind or is_silent(condition):
+        return "link silent"
+    return "gains unknown" if staging == "lost" or not condition.held else ""
+
+
+def _in_ground_time(age_s: float | None, speed: float) -> float | None:
+    return None if age_s is None else age_s / speed

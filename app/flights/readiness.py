@@ -9,15 +9,19 @@ was taken. In flight a loss takes nothing back, but tells the operator what the 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
 
 from app.common.errors import ConflictError
+from app.common.schemas import Schema
 from app.common.states import TrialState, VehicleState
 from app.live.hub import VehicleReport
 from app.live.messages import SILENT_AFTER_S
 
 ReadinessStep = Literal["control", "staged", "held", "in flight", "landed", "reviewed"]
-STEPS: Final[tuple[ReadinessStep, ...]] = ("control", "staged", "held", "in flight", "landed", "reviewed")
+Steps = tuple[ReadinessStep, ...]
+STEPS: Final[Steps] = ("control", "staged", "held", "in flight", "landed", "reviewed")
 
 LossKind = Literal[
     "worker away",
@@ -50,8 +54,6 @@ class LossText:
     keeps: ReadinessStep | None = "control"
 
 
-_BY_HAND: Final = "If it does not descend, use its own remote control."
-
 LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
     {
         "worker away": LossText(
@@ -82,7 +84,8 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
             way_on_planned="Check its power and its radio.",
             what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on_in_flight=f"Land is repeated until the vehicle descends. {_BY_HAND}",
+            way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
+            "control.",
         ),
         "gains unknown": LossText(
             what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
@@ -187,31 +190,27 @@ class Loss:
     way_on: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Readiness:
-    """Steps that hold, steps that were reached and are lost, each in order, and why."""
+class TrialReadiness(Schema):
+    """How far a flight has come, for this client: steps that hold, in order, and steps that were reached and lost."""
 
-    steps: tuple[ReadinessStep, ...]
-    lost: tuple[ReadinessStep, ...]
-    losses: tuple[Loss, ...]
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether the operator may start the takeoff."""
-        return self.steps[-1:] == ("staged",) and not self.losses
+    steps: Steps
+    lost: Steps
+    losses: Annotated[tuple[Loss, ...], Field(description="why; the takeoff is refused while there is any")]
+    is_ready: Annotated[bool, Field(description="whether the takeoff of the staged vehicle may be requested")]
 
 
-def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
+def readiness_of(standing: Standing, report: VehicleReport) -> TrialReadiness:
     """Evaluate how far a flight has come and which of it still holds, for who asks: control is no step of theirs while
     another operator has it."""
-    found = _readiness_of(standing, report)
-    if not standing.is_controlled_by_other:
-        return found
-    steps, lost = (tuple(step for step in each if step != "control") for each in (found.steps, found.lost))
-    return Readiness(steps=steps, lost=lost, losses=found.losses)
+    steps, lost, losses = _steps_of(standing, report)
+    if standing.is_controlled_by_other:
+        steps, lost = (tuple(step for step in each if step != "control") for each in (steps, lost))
+    is_ready = steps[-1:] == ("staged",) and not losses
+    return TrialReadiness(steps=steps, lost=lost, losses=losses, is_ready=is_ready)
 
 
-def _readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
+def _steps_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Steps, tuple[Loss, ...]]:
+    """Steps that hold, steps that were reached and are lost, each in order, and why."""
     reached = _REACHED[standing.trial]
     if standing.trial is TrialState.STAGED and standing.standing_down:
         reached = "control"
@@ -221,23 +220,27 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
         reached = "landed"
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
     if standing.trial is TrialState.LOST or standing.was_lost_in_flight:  # whether it has landed is not known
-        return Readiness(steps=STEPS[: _IN_FLIGHT + 1], lost=("landed",), losses=())
+        return STEPS[: _IN_FLIGHT + 1], ("landed",), ()
     if standing.has_not_landed and "landed" in steps:
-        return Readiness(steps=tuple(step for step in steps if step != "landed"), lost=("landed",), losses=())
+        return tuple(step for step in steps if step != "landed"), ("landed",), ()
     if len(steps) > _IN_FLIGHT + 1 or not steps:
-        return Readiness(steps=steps, lost=(), losses=())
+        return steps, (), ()
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        steps = STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1]
-        return Readiness(steps=steps, lost=(), losses=_in_flight(kinds, texts))
+        in_flight = tuple(
+            Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
+            for kind in kinds
+            if texts[kind].what_in_flight
+        )
+        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), in_flight
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))
     losses = tuple(
         Loss(kind=kind, what=_what(kind, texts, standing), way_on=_way_on(texts[kind], standing)) for kind in kinds
     )
-    return Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
+    return steps[:kept], steps[kept:], losses
 
 
 def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessStep:
@@ -250,7 +253,7 @@ def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessSt
     return "landed" if step in _ON_THE_GROUND and _link_loss(standing, report) is None else "in flight"
 
 
-def require_ready(readiness: Readiness) -> None:
+def require_ready(readiness: TrialReadiness) -> None:
     """Raise ConflictError with the first loss, if there is one."""
     if readiness.losses:
         raise ConflictError(readiness.losses[0].what, hint=readiness.losses[0].way_on)
@@ -275,9 +278,10 @@ def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
     found: list[LossKind] = []
     is_quarantined = standing.vehicle is VehicleState.QUARANTINED
     link = _link_loss(standing, report)
+    battery_v = None if report.status is None else report.status.battery_v
     if link is not None and not (is_quarantined and link in _ENDED_BY_RELEASE):
         found.append(link)
-    elif link is None and _is_battery_low(standing, report):
+    elif link is None and battery_v is not None and battery_v < standing.min_battery_v:
         found.append("battery low")
     if standing.failed_checks and link is None and not is_quarantined:
         found.append("checks failed")
@@ -302,19 +306,6 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     if status.state == "gone":
         return "link silent"
     return status.unready or None
-
-
-def _is_battery_low(standing: Standing, report: VehicleReport) -> bool:
-    battery_v = None if report.status is None else report.status.battery_v
-    return battery_v is not None and battery_v < standing.min_battery_v
-
-
-def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tuple[Loss, ...]:
-    return tuple(
-        Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
-        for kind in kinds
-        if texts[kind].what_in_flight
-    )
 
 
 def _count(kept: ReadinessStep | None) -> int:

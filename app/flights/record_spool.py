@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ from app.common.errors import StorageError
 from app.core.records.trajectory import Trajectory
 from app.db.earlier_ends import landing_of, read_end
 from app.db.types import FLIGHT_END
-from app.vehicles.base import Ending, FlightRecord, OptionValue
+from app.vehicles.base import FlightRecord
 
 RESERVED_BYTES: Final = 4 * 2**20
 """Reserved before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
@@ -27,24 +27,24 @@ _UNFINISHED: Final = ".claimed"
 _FINISHED: Final = ".flight"
 
 
+@dataclass(frozen=True, slots=True)
 class Spool:
     """The spool folder: one file per flight, either complete or absent."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    folder: Path
 
     def reserve(self, flight_id: int) -> None:
         """Reserve the disk space for one record. Raises StorageError when there is not enough."""
         path = self._path(flight_id, _UNFINISHED)
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir(parents=True, exist_ok=True)
             with path.open("wb") as file:
                 os.posix_fallocate(file.fileno(), 0, RESERVED_BYTES)
         except OSError as error:
             with suppress(OSError):
                 path.unlink(missing_ok=True)
             raise StorageError(
-                f"There is no space for the flight record in {self._folder}: {error.strerror}.",
+                f"There is no space for the flight record in {self.folder}: {error.strerror}.",
                 hint=f"Free at least {2 * RESERVED_BYTES // 2**20} MB there, then fly again. The vehicle has not "
                 "moved.",
             ) from error
@@ -59,7 +59,7 @@ class Spool:
                 file.truncate()
                 os.fsync(file.fileno())
             path.replace(self._path(flight_id, _FINISHED))
-            _sync_folder(self._folder)
+            _sync_folder(self.folder)
         except (OSError, ValueError, TypeError) as error:
             raise StorageError(
                 f"The record of flight {flight_id} could not be written to {path}: {error}.",
@@ -68,7 +68,7 @@ class Spool:
 
     def flight_ids(self) -> list[int]:
         """Flights whose records are in the spool."""
-        return sorted(int(path.stem) for path in self._folder.glob(f"*{_FINISHED}"))
+        return sorted(int(path.stem) for path in self.folder.glob(f"*{_FINISHED}"))
 
     def read(self, flight_id: int) -> FlightRecord:
         """Read a record. Raises StorageError when the file is damaged."""
@@ -101,11 +101,11 @@ class Spool:
 
     def delete_unfinished(self) -> None:
         """Free the reserved space of flights that left no record. Call it only while nothing flies."""
-        for path in self._folder.glob(f"*{_UNFINISHED}"):
+        for path in self.folder.glob(f"*{_UNFINISHED}"):
             path.unlink(missing_ok=True)
 
     def _path(self, flight_id: int, suffix: str) -> Path:
-        return self._folder / f"{flight_id}{suffix}"
+        return self.folder / f"{flight_id}{suffix}"
 
 
 def _pack(flight_id: int, record: FlightRecord) -> bytes:
@@ -133,13 +133,11 @@ def _unpack(content: bytes) -> FlightRecord:
     header = json.loads(line)
     time_s, *values = np.load(io.BytesIO(table), allow_pickle=False)
     channels = dict(zip(header["channels"], values, strict=True))
-    ending: Ending = header["ending"]
-    settings: dict[str, OptionValue] = header["settings"]
     return FlightRecord(
         trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
-        ending=ending,
+        ending=header["ending"],
         end=FLIGHT_END.validate_python(header["end"] if "end" in header else _earlier_end(header)),
-        settings=settings,
+        settings=header["settings"],
     )
 
 

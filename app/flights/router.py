@@ -8,7 +8,7 @@ from app.campaigns.trials import service as trials
 from app.campaigns.trials.router import TrialPredictorDep
 from app.campaigns.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
 from app.flights import service
-from app.flights.schemas import TrialReadiness
+from app.flights.readiness import TrialReadiness
 from app.web.dependencies import CurrentDatabase, Id, IdempotentPost, Live, Reader, RequestContextDep, json_only
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
@@ -32,7 +32,7 @@ def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body
     """Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
     for a real vehicle, which has to be staged."""
     return act(
-        lambda session: service.fly_trial(session, trial_id, body or FlightOrder(), asking),
+        lambda session: service.fly_trial(session, trial_id, asking, speed=(body or FlightOrder()).speed),
         ahead=lambda session: service.warm_gate_cache(session, trial_id),
     )
 
@@ -41,7 +41,7 @@ def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body
 def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator."""
     return act(
-        lambda session: service.stage_trial(session, trial_id, asking),
+        lambda session: service.fly_trial(session, trial_id, asking, mode="stage"),
         ahead=lambda session: service.warm_gate_cache(session, trial_id),
     )
 
@@ -70,7 +70,7 @@ def get_readiness(session: Reader, asking: RequestContextDep, live: Live, trial_
 async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body: Abort | None = None) -> AbortAnswer:
     """End a flight now. Goes straight to the worker without waiting for storage; may be repeated."""
     reason = (body or Abort()).reason
-    if live.worker_running and (await live.client.abort(trial_id, reason)).accepted:
+    if live.client.connected and (await live.client.abort(trial_id, reason)).accepted:
         return AbortAnswer(
             trial_id=trial_id, accepted=True, sentence="The worker ends the flight and restores the safe gains."
         )

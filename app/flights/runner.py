@@ -16,7 +16,6 @@ from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
 from app.db.session import RETRY_S
 from app.flights import flight_rows
-from app.flights.abort import AbortFlag
 from app.flights.flight_process import FlightProcess, FlightProcessPool, VehicleConnection
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
@@ -27,9 +26,9 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
-from app.flights.worker_part import WorkerPart
+from app.flights.worker_part import AbortFlag, WorkerPart
 from app.live.messages import FlightPhase, Phase
-from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
+from app.vehicles.base import find_mismatch
 from app.vehicles.end_texts import end_text
 from app.vehicles.registry import get_kind
 
@@ -40,10 +39,6 @@ POLL_INTERVAL_S: Final = 0.05
 _log = structlog.get_logger(__name__)
 
 
-def _refuse_session(_vehicle_id: int) -> FlightProcess:
-    raise VehicleError("There is no link to the vehicle.", hint="Connect it, then try again.")
-
-
 class FlightRunner:
     """Claims flights and carries them out.
 
@@ -51,7 +46,7 @@ class FlightRunner:
     opened for each flight in a process of the pool.
     """
 
-    def __init__(self, part: WorkerPart, *, session: Callable[[int], FlightProcess] = _refuse_session) -> None:
+    def __init__(self, part: WorkerPart, *, session: Callable[[int], FlightProcess]) -> None:
         self._part = part
         self._session = session
         self._spool = Spool(part.data_dir / "spool")
@@ -108,20 +103,16 @@ class FlightRunner:
         try:
             self._spool.reserve(request.flight_id)
             telemetry_log(self._part.data_dir, request.flight_id).parent.mkdir(exist_ok=True)
-            backend = self._acquire_backend(request)
+            if get_kind(request.vehicle_kind).connect is not None:
+                backend = self._session(request.vehicle_id)
+            else:
+                backend = self._process_pool.acquire()
         except (GainlineError, OSError) as error:
             return FlightOutcome(problem=f"The flight was not started: {error}")
         try:
             return self._fly_on_backend(backend, request, flag)
         finally:
             flag.add_listener(lambda _request: None)
-
-    def _acquire_backend(self, request: FlightRequest) -> FlightProcess:
-        """Return the process that flies the vehicle. Raises VehicleError when the vehicle needs a connection and has
-        none."""
-        if get_kind(request.vehicle_kind).connect is not None:
-            return self._session(request.vehicle_id)
-        return self._process_pool.acquire()
 
     def _fly_on_backend(self, backend: FlightProcess, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         """Fly the vehicle; whatever happens, release its process and return an outcome."""
@@ -213,7 +204,10 @@ class FlightRunner:
         _log.info("flight over", recorded=ended.record is not None, end=end_text(ended.ended), concern=ended.concern)
         flight_id = request.flight_id
         if ended.record is not None:
-            self._spool_record(request, ended.record)
+            try:
+                self._spool.write(flight_id, ended.record)
+            except StorageError as error:  # the record is still in memory and is stored from there
+                _log.error("record not spooled", why=str(error))
         try:
             stored = self._store_with_retry(
                 request, lambda session: flight_rows.record_outcome(session, flight_id, ended)
@@ -246,12 +240,6 @@ class FlightRunner:
             self._phase(request, "landed", f"The outcome could not be stored yet; Gainline keeps trying: {error}")
 
         return self._part.store_with_retry(store, refused) is not None
-
-    def _spool_record(self, request: FlightRequest, record: FlightRecord) -> None:
-        try:
-            self._spool.write(request.flight_id, record)
-        except StorageError as error:  # the record is still in memory and is stored from there
-            _log.error("record not spooled", why=str(error))
 
     def _recover_record(self, flight_id: int) -> None:
         """Move a record from the spool into the database; set a damaged or refused one aside. Raises StorageError."""

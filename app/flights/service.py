@@ -1,22 +1,19 @@
-"""Requests for flights, from the first to the operator's takeoff request: who may request which, and when. The rows
-themselves are in `flight_rows`."""
+"""Requests for flights, from the first to the operator's takeoff request: who may request which, and when; and their
+entries in a registered vehicle's log of commands. The rows of flights are in `flight_rows`."""
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Final
 
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, RequestContext, RequestOrigin
 from app.campaigns import history, rehearsals
 from app.campaigns.definitions import experiment_of_campaign
-from app.campaigns.history import set_flight_state
 from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, Trial
-from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action
-from app.common.errors import ConflictError, NotAllowedError
+from app.common.errors import ConflictError, GainlineError, NotAllowedError
 from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     HISTORY_TRIAL_STATES,
@@ -26,7 +23,6 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
-from app.core.errors import GainlineError
 from app.db.models import FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
@@ -34,76 +30,58 @@ from app.fleet.control import (
     control_of,
     is_in_control,
     may_command,
+    record_act,
     require_control,
     require_may_command,
     require_not_controlled_by_other,
 )
 from app.flights import flight_rows
-from app.flights.flight_commands import record_abort, record_flight_command
-from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
-from app.flights.schemas import TrialReadiness
+from app.flights.readiness import Standing, TrialReadiness, readiness_of, require_ready
 from app.live.hub import VehicleReport
-from app.vehicles.end_texts import unstaged_text
+from app.vehicles.end_texts import request_text, unstaged_text
 from app.vehicles.flight_end import Landing, Requester, StopRequest, withdrawn_by
 
-_NOT_LANDED: Final = frozenset({Landing.FELL, Landing.UNKNOWN})
 ReportOf = Callable[[int], VehicleReport]
 """What is known of a vehicle at this moment, by its id."""
 
 
 def warm_gate_cache(session: Session, trial_id: int) -> None:
-    """Run the gate's simulations before the transaction of `fly_trial` or `stage_trial` needs the results."""
+    """Run the gate's simulations before the transaction of `fly_trial` needs the results."""
     with suppress(GainlineError):
         row = history.trial_row(session, trial_id)
-        check_own_gains(session, row.campaign, row.gains)
+        trials.check_own_gains(session, row.campaign, row.gains)
 
 
 def fly_new_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext = LOCAL_CLI) -> Trial:
     """Request the flight of a trial that was planned in the same transaction, whose gains have thus just passed the
     gate. Raises as `fly_trial` does."""
     row = history.trial_row(session, trial_id)
-    request_flight(session, row, context, speed=order.speed)
+    _request_flight(session, row, context, mode="fly", speed=order.speed)
     return trial_view(session, row)
 
 
-def fly_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext) -> Trial:
-    """Request the flight of a planned trial without staging; the worker carries it out.
+def fly_trial(
+    session: Session, trial_id: int, context: RequestContext, *, mode: FlightMode = "fly", speed: float | None = None
+) -> Trial:
+    """Request the flight of a planned trial; the worker carries it out. Mode `stage`: a registered vehicle takes its
+    gains and waits for its operator's takeoff request.
 
     Raises ConflictError for an unclassified flight, a spent budget, a campaign that is over or not ready, a vehicle
     that is not ready or under another operator's control; GainsError that names what the gate refuses, unless that was
-    overruled; BusyError when the vehicle has a flight already; NotAllowedError for a real vehicle.
+    overruled; BusyError when the vehicle has a flight already; NotAllowedError when the client may not command the
+    vehicle, and without staging for a real one.
     """
-    return _request_trial_flight(session, trial_id, "fly", order.speed, context)
-
-
-def stage_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
-    """Request that a registered vehicle takes the gains of a planned trial and waits for its operator's takeoff
-    request.
-
-    Raises as `fly_trial` does, and NotAllowedError when the client may not command the vehicle.
-    """
-    return _request_trial_flight(session, trial_id, "stage", None, context)
-
-
-def _request_trial_flight(
-    session: Session, trial_id: int, mode: FlightMode, speed: float | None, context: RequestContext
-) -> Trial:
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, mode, row.state, f"Flight {row.number}")
     trials.require_open(session, row.campaign, HISTORY_TRIAL_STATES)
-    judged = check_own_gains(session, row.campaign, row.gains, overrule=row.overrule_reason or None)
+    judged = trials.check_own_gains(session, row.campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
-    request_flight(session, row, context, mode=mode, speed=speed)
+    _request_flight(session, row, context, mode=mode, speed=speed)
     return trial_view(session, row)
 
 
-def request_flight(
-    session: Session,
-    row: TrialRow,
-    context: RequestContext,
-    *,
-    mode: FlightMode = "fly",
-    speed: float | None = None,
+def _request_flight(
+    session: Session, row: TrialRow, context: RequestContext, *, mode: FlightMode, speed: float | None
 ) -> None:
     """Add the flight row that the worker claims. Raises as `fly_trial` does."""
     campaign, vehicle = row.campaign, row.campaign.vehicle
@@ -122,16 +100,15 @@ def request_flight(
     fleet.require_ready(session, vehicle, mode)
     by = require_not_controlled_by_other(vehicle, context)
     flight = flight_rows.add_flight(session, row.id, mode=mode, speed=speed)
-    record_flight_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
+    _record_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
     """How far the flight of a trial has come and what takes that back, for who asks. Raises NotFoundError."""
-    row = history.trial_row(session, trial_id)
-    return TrialReadiness.view_of(_readiness(session, row, context, report_of))
+    return _readiness(session, history.trial_row(session, trial_id), context, report_of)
 
 
-def _readiness(session: Session, row: TrialRow, context: RequestContext, report_of: ReportOf) -> Readiness:
+def _readiness(session: Session, row: TrialRow, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
     vehicle = row.campaign.vehicle
     flight = history.latest_flights(session, [row.id]).get(row.id)
     active = flight if flight is not None and flight.state in ACTIVE_FLIGHT_STATES else None
@@ -149,7 +126,9 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         abort_cause_open=row.abort_cause == "operator",
         failed_checks=tuple(str(check["title"]) for check in vehicle.checks or () if not check["passed"]),
         was_lost_in_flight=_was_lost_in_flight(row, flight),
-        has_not_landed=row.ending is not None and row.end is not None and row.end.landed in _NOT_LANDED,
+        has_not_landed=row.ending is not None
+        and row.end is not None
+        and row.end.landed in {Landing.FELL, Landing.UNKNOWN},
         flown_for_s=0.0 if row.flown_at is None else (utc_now() - row.flown_at).total_seconds(),
     )
     return readiness_of(standing, report_of(vehicle.id))
@@ -184,7 +163,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
         by = require_not_controlled_by_other(vehicle, context)
     require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
-    record_flight_command(session, flight, ActKind.TAKE_OFF, by=by)
+    _record_command(session, flight, ActKind.TAKE_OFF, by=by)
     return trial_view(session, row)
 
 
@@ -201,7 +180,7 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     flight.stand_down = requester
     operator = control_of(flight.vehicle) if is_in_control(flight.vehicle, context) else None
     by = "" if operator is None else operator.operator
-    record_flight_command(session, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester))
+    _record_command(session, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester))
     return trial_view(session, row)
 
 
@@ -234,7 +213,7 @@ def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
     row = history.trial_row(session, trial_id)
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
+        history.set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
         record_abort(session, trial_id, StopRequest(words))
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
@@ -248,3 +227,25 @@ def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
         f"Flight {row.number} is {row.state}: there is no flight to abort.",
         hint="Reload the trial.",
     )
+
+
+def _record_command(session: Session, flight: FlightRow, kind: ActKind, *, by: str, reason: str = "") -> None:
+    """Record a command to the vehicle of a flight, which has its outcome; `by` is the operator in control, empty if the
+    request came from elsewhere. Shared simulations have no log."""
+    if flight.vehicle.registered:
+        named = f"flight {flight.trial.number} of {flight.campaign.name}"
+        record_act(
+            session,
+            flight.vehicle,
+            kind,
+            by=by,
+            reason=f"{named}: {reason}" if reason else named,
+            result={"flight_id": flight.id},
+        )
+
+
+def record_abort(session: Session, trial_id: int, request: StopRequest) -> None:
+    """Record an abort, which everyone may request. Raises NotFoundError."""
+    history.trial_row(session, trial_id)
+    if (flight := history.latest_flights(session, [trial_id]).get(trial_id)) is not None:
+        _record_command(session, flight, ActKind.ABORT, by="", reason=request_text(request))

@@ -76,7 +76,7 @@ class JobRunner:
         with self.database.write() as session:
             for job_id in tuple(self._at_work):
                 jobs.heartbeat_job(session, job_id, worker=self.worker, lease_s=self.lease_s)
-            jobs.requeue_expired_jobs(session)
+            jobs.requeue_running_jobs(session, expired=True)
 
     def carry_out(self, job: ClaimedJob) -> None:
         """Carry out a job, from the stored order to the stored result. Raises nothing."""
@@ -95,7 +95,11 @@ class JobRunner:
                 self._fail(job, error)
             except Exception as error:  # noqa: BLE001 - outermost frame of the thread
                 _log.exception("job failed with an internal error")
-                self._fail(job, internal_error(f"{type(error).__name__}: {error}"))
+                internal = GainlineError(
+                    f"Internal error ({type(error).__name__}: {error}).",
+                    hint="Try again. If it happens again, report it with the job's log.",
+                )
+                self._fail(job, internal)
             finally:
                 self._at_work.discard(job.id)
 
@@ -109,11 +113,3 @@ class JobRunner:
                 jobs.fail_job(session, job.id, error, worker=self.worker)
         except StorageError as refused:
             _log.error("job abandoned; it runs again when its lease expires", why=str(refused))
-
-
-def internal_error(what: str) -> GainlineError:
-    """Error shown to a person after an internal error."""
-    return GainlineError(
-        f"Internal error ({what}).",
-        hint="Try again. If it happens again, report it with the job's log.",
-    )

@@ -16,11 +16,10 @@ from sqlalchemy import ColumnElement, Select, select, update
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
-from app.common.errors import NotFoundError
+from app.common.errors import GainlineError, NotFoundError
 from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
-from app.core.errors import GainlineError
 from app.db.base import added
 from app.db.models import CampaignRow, JobRow
 from app.db.pages import Order, page_of
@@ -165,14 +164,13 @@ def is_withdrawn(row: JobRow) -> bool:
     return row.state == JobState.CANCELLED and row.problem is not None
 
 
-def requeue_running_jobs(session: Session) -> list[int]:
-    """Queue all running jobs again at a worker's start, when no other worker can be running."""
-    return _requeue_all(session, _RUNNING)
-
-
-def requeue_expired_jobs(session: Session) -> list[int]:
-    """Queue jobs again whose lease has expired."""
-    return _requeue_all(session, _RUNNING.where(JobRow.lease_until < utc_now()))
+def requeue_running_jobs(session: Session, *, expired: bool = False) -> list[int]:
+    """Queue all running jobs again at a worker's start, when no other worker can be running; or those whose lease has
+    `expired`. Returns their ids."""
+    rows = session.scalars(_RUNNING.where(JobRow.lease_until < utc_now()) if expired else _RUNNING).all()
+    for row in rows:
+        _requeue(row)
+    return [row.id for row in rows]
 
 
 def latest_job(session: Session, campaign_id: int, kind: str) -> JobRow | None:
@@ -243,17 +241,16 @@ def job_views(session: Session, rows: Sequence[JobRow]) -> list[Job]:
     ids = {row.campaign_id for row in rows if row.campaign_id is not None}
     named = session.execute(select(CampaignRow.id, CampaignRow.name).where(CampaignRow.id.in_(ids)))
     names = {row.id: row.name for row in named}
-    return [_view(row, None if row.campaign_id is None else names.get(row.campaign_id)) for row in rows]
-
-
-def _view(row: JobRow, campaign_name: str | None) -> Job:
-    return Job.view_of(
-        row,
-        name=_ordered(row),
-        campaign_name=campaign_name,
-        remaining_s=_remaining_s(row),
-        actions=allowed(JOB_ACTIONS, row.state),
-    )
+    return [
+        Job.view_of(
+            row,
+            name=_ordered(row),
+            campaign_name=None if row.campaign_id is None else names.get(row.campaign_id),
+            remaining_s=_remaining_s(row),
+            actions=allowed(JOB_ACTIONS, row.state),
+        )
+        for row in rows
+    ]
 
 
 def job_problem(row: JobRow) -> Trouble | None:
@@ -298,13 +295,6 @@ def _is_order(name: str) -> ColumnElement[bool]:
 def _ordered(row: JobRow) -> str:
     """Name in the job's order; empty without an order."""
     return str((row.order or {}).get("name", ""))
-
-
-def _requeue_all(session: Session, wanted: Select[JobRow]) -> list[int]:
-    rows = session.scalars(wanted).all()
-    for row in rows:
-        _requeue(row)
-    return [row.id for row in rows]
 
 
 def _requeue(row: JobRow) -> None:

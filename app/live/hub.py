@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Literal, TypeVar
+from typing import Final, Literal
 
 import structlog
 from sqlalchemy.exc import DBAPIError
@@ -253,7 +253,6 @@ class OutboxTail:
                 watch.wait(self._stop, LOOK_ANYWAY_S)
 
 
-T = TypeVar("T")
 BEAT_S: Final = 3.0
 """Interval of a message on every stream, so that a client detects a dead connection by longer silence."""
 
@@ -268,10 +267,6 @@ class Live:
             on_message=self._on_message,
             on_link=lambda up: self.hub.publish(LinkState(worker=up)),
         )
-
-    @property
-    def worker_running(self) -> bool:
-        return self.client.connected
 
     @property
     def worker(self) -> Literal["running", "not answering", "absent"]:
@@ -298,7 +293,13 @@ class Live:
 async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
     """Run the live link from the start to the end of the web process."""
     live = Live(data_dir)
-    tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
+    loop = asyncio.get_running_loop()
+
+    def publish(change: Change) -> None:
+        with suppress(RuntimeError):  # the loop has ended
+            loop.call_soon_threadsafe(live.hub.publish, change)
+
+    tail = OutboxTail(database, publish)
     await asyncio.to_thread(tail.start)
     running = [asyncio.create_task(work) for work in (live.client.run(), live.client.watch(), live.beat())]
     try:
@@ -311,13 +312,3 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
             with suppress(asyncio.CancelledError):
                 await task
         await asyncio.to_thread(tail.stop)
-
-
-def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[T], None]) -> Callable[[T], None]:
-    """Wrap a call so that it may be made from any thread; calls after the loop has ended are dropped."""
-
-    def later(item: T) -> None:
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(call, item)
-
-    return later

@@ -83,12 +83,18 @@ class LiveServer:
         self._writers: set[asyncio.StreamWriter] = set()
         self._orders: set[asyncio.Task[None]] = set()
         self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="live", daemon=True)
+        self._thread = threading.Thread(target=self._loop.run_forever, name="live", daemon=True)
 
     def __enter__(self) -> Self:
-        listener = _listen(self._path)
+        """Listen at a socket that only this user may open; no client can connect before it listens, which is after the
+        chmod. The caller holds the worker's lock, so an existing file belongs to a dead worker."""
+        self._path.unlink(missing_ok=True)
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        listener.bind(str(self._path))
+        self._path.chmod(0o600)
         self._thread.start()
-        asyncio.run_coroutine_threadsafe(self._open(listener), self._loop).result()
+        serving = asyncio.start_unix_server(self._serve, sock=listener, limit=MAX_LINE_BYTES)
+        self._server = asyncio.run_coroutine_threadsafe(serving, self._loop).result()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -101,13 +107,6 @@ class LiveServer:
     def publish(self, message: PublishedMessage) -> None:
         """Send to every client, without blocking. May be called from any thread."""
         self._loop.call_soon_threadsafe(self._send_all, message)
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        self._loop.run_forever()
-
-    async def _open(self, listener: socket.socket) -> None:
-        self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=MAX_LINE_BYTES)
 
     async def _close(self) -> None:
         self._server.close()
@@ -175,18 +174,6 @@ def _is_in_time(by_s: float) -> bool:
     return time.monotonic() <= by_s
 
 
-def _listen(path: Path) -> socket.socket:
-    """A bound socket that only this user may open; no client can connect before it listens, which is after the chmod.
-
-    The caller holds the worker's lock, so an existing file belongs to a dead worker.
-    """
-    path.unlink(missing_ok=True)
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    listener.bind(str(path))
-    path.chmod(0o600)
-    return listener
-
-
 class LinkDownError(GainlineError):
     """The worker cannot be reached, so a message would not arrive."""
 
@@ -225,16 +212,13 @@ class LiveClient:
             if self.connected:
                 try:
                     await self._ask(Ping(request=next(self._numbers)))
+                    answers = True
                 except LinkDownError:
-                    self._note(answers=False)
-                else:
-                    self._note(answers=True)
-
-    def _note(self, *, answers: bool) -> None:
-        before, self._answers = self.answers, answers
-        if self.answers != before:
-            _log.warning("worker answers again" if answers else "worker does not answer")
-            self._on_link(self.answers)
+                    answers = False
+                before, self._answers = self.answers, answers
+                if self.answers != before:
+                    _log.warning("worker answers again" if answers else "worker does not answer")
+                    self._on_link(self.answers)
 
     async def run(self) -> None:
         """Connect and listen until cancelled."""

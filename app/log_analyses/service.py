@@ -6,7 +6,7 @@ from app.figures.base import card_of
 from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
 from app.log_analyses.schemas import LogAnalysis
-from app.processes.sandbox import FILE, run_limited
+from app.processes.calls import FILE, run_limited
 
 if TYPE_CHECKING:
     from app.autopilots.takeoffs import Takeoff

@@ -8,8 +8,7 @@ from app.db.session import Database
 from app.reports.html import Document, chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
-from app.web.dependencies import CurrentDatabase, CurrentSettings, Id
-from app.web.downloads import described
+from app.web.dependencies import CurrentDatabase, CurrentSettings, Id, described
 
 router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 

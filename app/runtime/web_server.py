@@ -120,7 +120,9 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
     address = web_address(settings.host, listener.getsockname()[1])
 
     def ready() -> None:
-        _spare_what_stays()
+        # Exclude the loaded program from garbage collection, which would otherwise delay responses.
+        gc.collect()
+        gc.freeze()
         loading = threading.Timer(NUMERICS_AFTER_S, _load_numerics)
         loading.daemon = True
         loading.start()
@@ -149,12 +151,6 @@ def _load_numerics() -> None:
     """Import the numerics, so that the first page with charts does not wait for them."""
     for module in NUMERICS:
         importlib.import_module(module)
-
-
-def _spare_what_stays() -> None:
-    """Exclude the loaded program from garbage collection, which would otherwise delay responses."""
-    gc.collect()
-    gc.freeze()
 
 
 def _announce_links(settings: Settings, port: int, keyring: Keyring, announce: Callable[[str], None]) -> None:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from multiprocessing import parent_process
+from functools import partial
 from types import FrameType
 from typing import Final
 
@@ -35,15 +35,14 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import RETRY_S, Database, retry_until_stored
-from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
-from app.flights.worker_part import WorkerPart
+from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
-from app.processes.locks import LockedError, exclusive
-from app.processes.pool import ComputePool
+from app.processes import LockedError, exclusive, when_parent_ends
+from app.processes.calls import ComputePool
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
 from app.vehicles.flight_end import Requester, StopRequest
@@ -62,12 +61,12 @@ interpreter lock; Python's default of 5 ms adds up over several threads."""
 _log = structlog.get_logger(__name__)
 
 
+@dataclass(slots=True)
 class ShutdownRequest:
     """Request that the worker ends: it then claims no new work, and finishes its flights."""
 
-    def __init__(self) -> None:
-        self.event = threading.Event()
-        self.reason = ""
+    event: threading.Event = field(default_factory=threading.Event)
+    reason: str = ""
 
     def set(self, reason: str) -> None:
         self.reason = self.reason or reason
@@ -80,10 +79,8 @@ def run_worker(settings: Settings) -> None:
     Raises AlreadyRunningError when another worker uses this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
-    abort_registry, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     try:
-        _run(settings, ending, abort_registry, keep_waiting=lambda: False)
+        _run(settings, ShutdownRequest(), (signal.SIGINT, signal.SIGTERM), keep_waiting=lambda: False)
     except LockedError as error:
         raise AlreadyRunningError(
             f"Another Gainline worker ({error.holder or 'its process is unknown'}) already uses "
@@ -98,16 +95,21 @@ def run_supervised_worker(settings: Settings) -> None:
 
     It waits while an older worker ends, and ends with its parent once its flights are over.
     """
-    abort_registry, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGTERM, ending=ending, abort_registry=abort_registry)
-    threading.Thread(target=_shut_down_with_parent, args=(ending,), daemon=True).start()
+    ending = ShutdownRequest()
+    when_parent_ends(partial(ending.set, "the web process has exited"))
     with suppress(LockedError):  # stopped while it waited for the lock
-        _run(settings, ending, abort_registry, keep_waiting=lambda: not ending.event.is_set())
+        _run(settings, ending, (signal.SIGTERM,), keep_waiting=lambda: not ending.event.is_set())
 
 
 def _run(
-    settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, *, keep_waiting: Callable[[], bool]
+    settings: Settings,
+    ending: ShutdownRequest,
+    signals: Sequence[signal.Signals],
+    *,
+    keep_waiting: Callable[[], bool],
 ) -> None:
+    abort_registry = AbortRegistry()
+    _install_signal_handlers(signals, ending, abort_registry)
     prepare_data_dir(settings.data_dir)
     narrowed = make_private(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
@@ -119,7 +121,9 @@ def _run(
         Worker(settings, ending, abort_registry).work()
 
 
-def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, abort_registry: AbortRegistry) -> None:
+def _install_signal_handlers(
+    signals: Sequence[signal.Signals], ending: ShutdownRequest, abort_registry: AbortRegistry
+) -> None:
     """Install signal handlers that only queue the request, because the interrupted thread may hold any lock; a separate
     thread handles it."""
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()
@@ -135,12 +139,6 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
     threading.Thread(target=handle_signals, name="signals", daemon=True).start()
     for number in signals:
         signal.signal(number, note)
-
-
-def _shut_down_with_parent(ending: ShutdownRequest) -> None:
-    if (parent := parent_process()) is not None:
-        parent.join()
-        ending.set("the web process has exited")
 
 
 def _say_it_computes(first: Future[int]) -> None:

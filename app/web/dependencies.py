@@ -1,5 +1,5 @@
-"""Dependencies of routes: a session to read, a session to write, idempotent POST requests, and uploaded files, which
-are spooled while they arrive.
+"""What routes have in common: sessions to read and to write, idempotent POST requests, uploaded files, which are
+spooled while they arrive, and files that are made for one download.
 """
 
 import hashlib
@@ -8,10 +8,11 @@ import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Annotated, Any, BinaryIO, Final, TypeVar
+from typing import IO, Annotated, Any, BinaryIO, Final, TypeVar
 
 from fastapi import Depends, Header, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
+from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json
 from sqlalchemy.orm import Session
@@ -279,3 +280,32 @@ def _part(form: FormData, name: str) -> UploadFile | None:
 _ARRIVING: Final = {_CSV: _raw, "application/csv": _raw, _ANY: _raw, "multipart/form-data": _form}
 
 Record = Annotated[Upload, Depends(_upload)]
+
+
+def described(*types: str, binary: bool = True) -> dict[int | str, dict[str, Any]]:
+    """Description of a response that is a file of one of these media types, for OpenAPI."""
+    schema = {"type": "string", "format": "binary"} if binary else {"type": "string"}
+    return {200: {"content": {each: {"schema": schema} for each in types}}}
+
+
+def download(file: IO[bytes], name: str, *, media_type: str) -> StreamingResponse:
+    """Response with the whole content of an open file, which is closed at the end.
+
+    The file should have no name on the disk: then nothing is left of it, however the process ends. It is not compressed
+    any more, because the content is already, and with a length the browser shows the progress. Pages of other sites
+    cannot use it.
+    """
+    headers = {
+        "Content-Disposition": f'attachment; filename="{name}"',
+        "Content-Length": str(file.seek(0, 2)),
+        "Content-Encoding": "identity",
+        "Cross-Origin-Resource-Policy": "same-origin",
+    }
+    file.seek(0)
+    return StreamingResponse(_chunks(file), media_type=media_type, headers=headers)
+
+
+def _chunks(file: IO[bytes]) -> Iterator[bytes]:
+    with file:
+        while chunk := file.read(_IN_MEMORY_BYTES):
+            yield chunk

@@ -1,18 +1,19 @@
-"""Errors over HTTP: problem details (RFC 9457) with a hint, and their description in the OpenAPI document. The only
-module that maps errors to status codes.
+"""Errors over HTTP: problem details (RFC 9457) with a hint, why a request's schema refuses a value, and the description
+of both in the OpenAPI document. The only module that maps errors to status codes.
 """
 
 import errno
 import json
 import uuid
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import structlog
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.constants import REF_TEMPLATE
+from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from app.common.errors import (
@@ -33,7 +34,6 @@ from app.common.errors import (
 )
 from app.common.schemas import Problem, ProblemField
 from app.live.link import LinkDownError
-from app.web.refusals import reason_of
 
 MEDIA_TYPE: Final = "application/problem+json"
 
@@ -78,17 +78,24 @@ _log = structlog.get_logger(__name__)
 
 
 def install(app: FastAPI) -> None:
-    """Answer every error of the application with problem details."""
+    """Answer every error of the application with problem details, and add their schema to its OpenAPI document."""
+    plain = app.openapi
+
+    def complete() -> dict[str, Any]:
+        document = plain()
+        schemas = document.setdefault("components", {}).setdefault("schemas", {})
+        if "Problem" not in schemas:
+            problem = Problem.model_json_schema(ref_template=REF_TEMPLATE)
+            schemas.update(problem.pop("$defs"))
+            schemas["Problem"] = problem
+        return document
+
+    app.openapi = complete  # type: ignore[method-assign]
     app.add_exception_handler(GainlineError, _own_error)
     app.add_exception_handler(RequestValidationError, _invalid_request)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(OSError, _system_error)
     app.add_exception_handler(Exception, _unexpected)
-
-
-def kind_of(error: GainlineError) -> tuple[HTTPStatus, str]:
-    """Status and title of the nearest listed class."""
-    return next(_KINDS[kind] for kind in type(error).__mro__ if kind in _KINDS)
 
 
 def _problem(
@@ -123,7 +130,7 @@ async def _own_error(_request: Request, error: Exception) -> Response:
 
 def problem_response(error: GainlineError) -> Response:
     """Response for one of the application's errors; also used before the request reaches the application."""
-    status, title = kind_of(error)
+    status, title = next(_KINDS[kind] for kind in type(error).__mro__ if kind in _KINDS)
     return _problem(
         status,
         error.message,
@@ -161,6 +168,93 @@ def _refused(found: Mapping[str, Any], schema: object) -> ProblemField:
     return ProblemField(field=".".join(map(str, inner or [part])), reason=reason_of(found, schema))
 
 
+_SHOWN: Final = 40
+"""Longest text of a refused value that is repeated."""
+
+_REASONS: Final[Mapping[str, str]] = {
+    "missing": "is missing",
+    "extra_forbidden": "is not a known field",
+    "greater_than_equal": "must be at least {ge}",
+    "greater_than": "must be above {gt}",
+    "less_than_equal": "must be at most {le}",
+    "less_than": "must be below {lt}",
+    "string_too_short": "must have at least {min_length} characters",
+    "string_too_long": "must have at most {max_length} characters",
+    "literal_error": "must be {expected}",
+    "enum": "must be {expected}",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be text",
+    "dict_type": "must be an object",
+    "model_type": "must be an object with fields",
+    "model_attributes_type": "must be an object with fields",
+    "list_type": "must be a list",
+    "tuple_type": "must be a list",
+}
+"""By the validator's type of error, with its limits."""
+
+_ABOUT_FIELDS: Final = frozenset({"extra_forbidden", "model_type", "model_attributes_type"})
+_QUOTED: Final = frozenset(name for name in _REASONS if name not in {"missing", "extra_forbidden"}) - {
+    "string_too_short",
+    "string_too_long",
+}
+
+
+def reason_of(found: Mapping[str, Any], schema: object = None) -> str:
+    """The reason of one of the validator's errors, with the refused value where it is a short one; a type of error that
+    has no words here keeps the validator's message.
+
+    With the body's `schema`, fields that do not exist and values that should be objects are refused with the fields
+    that there are.
+    """
+    kind, limits, value = found["type"], found.get("ctx", {}), found.get("input")
+    if fields := _fields_at(schema, [part for part in found["loc"] if part != "body"], kind):
+        return f"{_REASONS[kind]} ({', '.join(fields)})"
+    if kind == "string_too_short" and limits["min_length"] == 1:
+        return "must not be empty"
+    if kind not in _REASONS:
+        text: str = found["msg"]
+        return text[:1].lower() + text[1:]
+    written = {name: f"{limit:g}" if isinstance(limit, float) else limit for name, limit in limits.items()}
+    reason = _REASONS[kind].format_map(written)
+    return f"{reason}, got {_written(value)}" if kind in _QUOTED and _is_short(value) else reason
+
+
+def _fields_at(schema: object, path: Sequence[object], kind: str) -> tuple[str, ...]:
+    """Names of the fields known where the error is; none for errors of another type, and in a free mapping."""
+    if kind not in _ABOUT_FIELDS:
+        return ()
+    for name in path[:-1] if kind == "extra_forbidden" else path:
+        model = _model_in(schema)
+        if model is None or name not in model.model_fields:
+            return ()
+        schema = model.model_fields[str(name)].annotation
+    model = _model_in(schema)
+    return () if model is None else tuple(model.model_fields)
+
+
+def _model_in(schema: object) -> type[BaseModel] | None:
+    """The model itself, or the one in a union with None."""
+    if isinstance(schema, type) and issubclass(schema, BaseModel):
+        return schema
+    return next((model for part in get_args(schema) if (model := _model_in(part)) is not None), None)
+
+
+def _is_short(value: object) -> bool:
+    return isinstance(value, bool | int | float | str) and len(str(value)) <= _SHOWN
+
+
+def _written(value: object) -> str:
+    """A value as JSON has it."""
+    return str(value).lower() if isinstance(value, bool) else f"{value!r}"
+
+
 async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     detail, hint = str(error.detail), "Correct the request and send it again."
@@ -196,19 +290,3 @@ async def _unexpected(request: Request, error: Exception) -> Response:
         f"Internal error {number}; nothing from this request was stored.",
         f"Try again. If it happens again, report it with its number, {number}, and the log.",
     )
-
-
-def describe(app: FastAPI) -> None:
-    """Add the problem schema to the application's OpenAPI document."""
-    plain = app.openapi
-
-    def complete() -> dict[str, Any]:
-        document = plain()
-        schemas = document.setdefault("components", {}).setdefault("schemas", {})
-        if "Problem" not in schemas:
-            problem = Problem.model_json_schema(ref_template=REF_TEMPLATE)
-            schemas.update(problem.pop("$defs"))
-            schemas["Problem"] = problem
-        return document
-
-    app.openapi = complete  # type: ignore[method-assign]

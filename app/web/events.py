@@ -52,7 +52,7 @@ async def events(
         )
         if not known:
             yield ServerSentEvent(event="reset", id=str(sent), data={})
-        for change in await asyncio.to_thread(_backlog, database, sent):
+        for change in await asyncio.to_thread(list, changes_after(database, sent)):
             yield _event(live, change)
             sent = change.id
         async for item in stream:
@@ -74,10 +74,6 @@ def _start(database: Database, last_event_id: str | None, since_s: float) -> tup
         if last_event_id.isdecimal() and holds_everything_after(session, int(last_event_id)):
             return int(last_event_id), True
         return latest, False
-
-
-def _backlog(database: Database, event_id: int) -> list[Change]:
-    return list(changes_after(database, event_id))
 
 
 def _event(live: Live, item: Change | LiveItem) -> ServerSentEvent:

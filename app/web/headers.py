@@ -7,7 +7,6 @@ else as soon as the limit is exceeded.
 """
 
 import gzip
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +18,8 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.common.errors import GainlineError, Problem, TooLargeError
+from app.common.errors import Problem, TooLargeError
+from app.web.errors import problem_response
 
 _SECURITY: Final = {
     "Content-Security-Policy": (
@@ -39,6 +39,7 @@ def _caching(path: str, status: int) -> str:
     return "no-store" if path.startswith("/api/") else "no-cache"
 
 
+@dataclass(frozen=True, slots=True)
 class HeadersMiddleware:
     """Adds the headers as a response starts; the body passes unchanged.
 
@@ -46,12 +47,11 @@ class HeadersMiddleware:
     dashboard.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+    app: ASGIApp
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
-            await self._app(scope, receive, send)
+            await self.app(scope, receive, send)
             return
 
         if scope["path"] == "/api" or scope["path"].startswith("/api/"):
@@ -65,11 +65,7 @@ class HeadersMiddleware:
                 headers.setdefault("Cache-Control", _caching(scope["path"], message["status"]))
             await send(message)
 
-        await self._app(scope, receive, send_with_headers)
-
-
-_FILES: Final = 64
-"""More files than a build has."""
+        await self.app(scope, receive, send_with_headers)
 
 
 class Assets(StaticFiles):
@@ -87,13 +83,11 @@ class Assets(StaticFiles):
         return Response(body, media_type=answer.media_type, headers=headers)
 
 
-@lru_cache(maxsize=_FILES)
+@lru_cache(maxsize=64)  # more files than a build has
 def _compressed(file: Path) -> bytes:
     return gzip.compress(file.read_bytes(), mtime=0)
 
 
-JSON_BYTES: Final = 2**20
-"""Largest JSON body."""
 PHOTO_BYTES: Final = 10 * 2**20 + 2**12
 """Largest photo, including the form around it."""
 BUNDLE_BYTES: Final = 2**30
@@ -109,14 +103,14 @@ class _Limit:
     otherwise: str
 
 
-_JSON: Final = _Limit("body", JSON_BYTES, "no operation of the API needs more")
+_JSON: Final = _Limit("body", 2**20, "no operation of the API needs more")
 
 
 class BodyLimitMiddleware:
     """Limits every request's body: flight records to `upload_bytes`, photos to 10 MiB, bundles to 1 GiB, everything
     else to 1 MiB."""
 
-    def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
+    def __init__(self, app: ASGIApp, *, upload_bytes: int) -> None:
         self._app = app
         record = "a flight record has at most 200 000 rows, so downsample or trim a longer one"
         of_flight = _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs")
@@ -130,7 +124,6 @@ class BodyLimitMiddleware:
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),
             "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` imports larger ones"),
         }
-        self._refuse = refuse
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -140,7 +133,7 @@ class BodyLimitMiddleware:
         limit = next((limit for ending, limit in self._uploads.items() if path.endswith(ending)), _JSON)
         stated = Headers(scope=scope).get("content-length", "")
         if stated.isdecimal() and int(stated) > limit.size_bytes:
-            await self._refuse(_too_large(limit))(scope, receive, send)
+            await problem_response(_too_large(limit))(scope, receive, send)
             return
         received = 0
         has_started = False
@@ -161,7 +154,7 @@ class BodyLimitMiddleware:
 
         await self._app(scope, receive_bounded, send_unless_too_large)
         if not has_started and received > limit.size_bytes:  # whatever the framework made of the error above
-            await self._refuse(_too_large(limit))(scope, receive, send)
+            await problem_response(_too_large(limit))(scope, receive, send)
 
 
 def _too_large(limit: _Limit) -> TooLargeError:

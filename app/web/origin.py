@@ -7,8 +7,8 @@ vehicle must also present a key (`app.accounts.keys_and_links`).
 """
 
 import ipaddress
-from collections.abc import Callable, Iterator
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Final
 from urllib.parse import urlsplit
 
@@ -19,8 +19,9 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Caller, Key, Permission, RequestOrigin, require
-from app.common.errors import GainlineError, NotAllowedError
+from app.common.errors import NotAllowedError
 from app.common.settings import is_loopback
+from app.web.errors import foreign_request_response, problem_response
 
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _COSTLY: Final = ("/api/system/backup", "/report.pdf", "/bundle")
@@ -38,75 +39,62 @@ _FORWARDED_BEGINS: Final = (
 @dataclass(frozen=True, slots=True)
 class AccessMiddleware:
     """Refuses requests under a foreign host name, API requests from another site's pages, and changes without a key for
-    them.
-
-    `host` is the name that the server listens on; `refuse_foreign` builds the response from a sentence and a hint,
-    `refuse` from one of the application's errors.
-    """
+    them."""
 
     app: ASGIApp
-    _: KW_ONLY
-    host: str
-    refuse_foreign: Callable[[str, str], Response]
-    refuse: Callable[[GainlineError], Response]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http" and (refusal := self._refusal(scope)) is not None:
+        if scope["type"] == "http" and (refusal := _refusal(Request(scope))) is not None:
             await refusal(scope, receive, send)
             return
         await self.app(scope, receive, send)
 
-    def _refusal(self, scope: Scope) -> Response | None:
-        headers = Headers(scope=scope)
-        address = headers.get("host", "")
-        name = _name_of(address)
-        if name not in {"localhost", self.host.lower()} and not _is_ip_address(name):  # DNS rebinding needs a name
-            return self.refuse_foreign(
-                f"This server does not accept requests for the host name “{address}”.",
-                "Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
-            )
-        path: str = scope["path"]
-        changes = scope["method"] not in _READS
-        if (changes or path.startswith("/api/")) and _is_foreign(headers, address):
-            return self.refuse_foreign(
-                "The request came from a page of another site and was rejected.",
-                "Use the dashboard, or send the request from a program without the header Origin.",
-            )
-        if changes or path.endswith(_COSTLY):
-            try:
-                require(Permission.CHANGE, read_caller(scope, host=self.host))
-            except NotAllowedError as error:
-                return self.refuse(error)
-        return None
+
+def _refusal(request: Request) -> Response | None:
+    address = request.headers.get("host", "")
+    name = _name_of(address)
+    own_names = {"localhost", request.app.state.settings.host.lower()}
+    if name not in own_names and not _is_ip_address(name):  # DNS rebinding needs a name
+        return foreign_request_response(
+            f"This server does not accept requests for the host name “{address}”.",
+            "Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
+        )
+    path: str = request.scope["path"]
+    changes = request.method not in _READS
+    if (changes or path.startswith("/api/")) and _is_foreign(request.headers, address):
+        return foreign_request_response(
+            "The request came from a page of another site and was rejected.",
+            "Use the dashboard, or send the request from a program without the header Origin.",
+        )
+    if changes or path.endswith(_COSTLY):
+        try:
+            require(Permission.CHANGE, caller_of(request))
+        except NotAllowedError as error:
+            return problem_response(error)
+    return None
 
 
 def caller_of(request: Request) -> Caller:
     """The caller of a request."""
-    return read_caller(request.scope, host=request.app.state.settings.host)
-
-
-def read_caller(scope: Scope, *, host: str) -> Caller:
-    """The caller of the request in `scope`, to a server that listens on this host."""
-    headers = Headers(scope=scope)
-    because = _describe_origin(scope.get("client"), headers)
-    keyring: Keyring = scope["app"].state.keyring
+    because = _describe_origin(request)
+    keyring: Keyring = request.app.state.keyring
     return Caller(
         place=RequestOrigin.ELSEWHERE if because else RequestOrigin.HERE,
-        key=max(map(keyring.key_of, _shown(headers, keyring.cookie)), default=Key.NONE),
-        exposed=not is_loopback(host),
+        key=max(map(keyring.key_of, _shown(request.headers, keyring.cookie)), default=Key.NONE),
+        exposed=not is_loopback(request.app.state.settings.host),
         because=because,
     )
 
 
-def _describe_origin(client: tuple[str, int] | None, headers: Headers) -> str:
+def _describe_origin(request: Request) -> str:
     """How a request came that is not from this computer; empty for one that is."""
-    for header in headers:
+    for header in request.headers:
         if header in _FORWARDED or header.startswith(_FORWARDED_BEGINS):
             return f"through a proxy or tunnel (header {header})"
-    peer = "" if client is None else client[0]
+    peer = "" if request.client is None else request.client.host
     if not is_loopback(peer.removeprefix("::ffff:")):
         return f"from another device ({peer})"
-    address = headers.get("host", "")
+    address = request.headers.get("host", "")
     return "" if is_loopback(_name_of(address)) else f"under a name that is not this computer's own ({address})"
 
 

@@ -11,7 +11,7 @@ from app.core.tuning.landscape import predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
-from app.processes.pool import ComputePool
+from app.processes.calls import ComputePool
 from tests.builders import WORKER, create_campaign, create_flown_campaign, create_flown_trial, get
 from tests.core.tuning.defined import plan_grid
 

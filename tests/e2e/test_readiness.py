@@ -1,19 +1,17 @@
 """Readiness on the fly screen: taken back by every loss, with what it means and the way on, and given again. What is
 lost and held in which state is the server's rule: tests/flights/test_readiness.py."""
 
-import json
 import os
 import re
 import signal
 from collections.abc import Iterator
-from dataclasses import asdict
 from functools import partial
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from app.common.states import TrialState, VehicleState
-from app.flights.readiness import STEPS, Readiness, readiness_of
+from app.flights.readiness import STEPS, readiness_of
 from tests.e2e.conftest import Opener, Server, new_context
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.flying_by_hand import (
@@ -255,11 +253,10 @@ SHOWN: list[tuple[str, str | None]] = [
 
 def test_states_and_losses_are_shown_as_the_server_says_them(dashboard: Dashboard, trial_id: int) -> None:
     page = dashboard.page
-    shown: Readiness = readiness_of(standing(TrialState.STAGED, {}), GOOD)
+    shown = readiness_of(standing(TrialState.STAGED, {}), GOOD)
 
     def answer(route: Route) -> None:
-        body = {**asdict(shown), "is_ready": shown.is_ready}
-        route.fulfill(status=200, content_type="application/json", body=json.dumps(body))
+        route.fulfill(status=200, content_type="application/json", body=shown.model_dump_json())
 
     page.route(READINESS, answer)
     for name, loss in SHOWN:

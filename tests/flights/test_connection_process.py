@@ -290,7 +290,7 @@ def test_a_command_is_executed_at_once_and_ends_the_act_in_progress(
     ordered_s, told = order_when(rig, line, while_it_hears, MOTORS_OFF), len(stops_told_s(rig))
     answered = process._act(VehicleRequest(kind=kind, safe_gains=SAFE))
     assert "interrupted: motors off was commanded (people below)" in answered.problem
-    assert line.said[-1] == CommandForwarded(7, "motors off", "people below", is_awaited=True)
+    assert line.said[-1] == CommandForwarded(MOTORS_OFF, is_awaited=True)
     assert stops_told_s(rig)[told] - ordered_s[0] < 0.5
 
 
@@ -301,7 +301,7 @@ def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
     ordered_s = order_when(rig, line, "PARAM_SET", ordered)
     told = len(rig.heard)
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
-    forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, is_awaited=ordered is MOTORS_OFF)
+    forwarded = CommandForwarded(ordered, is_awaited=ordered is MOTORS_OFF)
     assert forwarded in line.said
     kind = "COMMAND_LONG" if ordered is MOTORS_OFF else "SCRIPT_ITEM"
     assert next(at_s for at_s, message in rig.heard[told:] if message.get_type() == kind) - ordered_s[0] < 0.5
@@ -316,7 +316,7 @@ def test_an_order_that_comes_too_late_is_not_passed_on_and_interrupts_nothing(
     assert process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE)).problem == ""
     said = line.said[-1]
     assert isinstance(said, CommandForwarded)
-    assert (said.number, "too late" in said.problem) == (7, True)
+    assert (said.command.number, "too late" in said.problem) == (7, True)
     assert len(stops_told_s(rig)) == told
 
 
@@ -330,7 +330,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
     process._fly(flight_of(rig, tmp_path))
     answers = [said for said in line.said if isinstance(said, CommandForwarded)]
-    assert [(said.order, said.problem, said.is_awaited) for said in answers[:2]] == [
+    assert [(said.command.order, said.problem, said.is_awaited) for said in answers[:2]] == [
         ("land", "", False),
         ("motors off", "", True),
     ]
@@ -373,7 +373,7 @@ def stop_outcomes(process: VehicleProcess, line: RecordingPipe) -> list[str]:
     for _ in range(7):
         process._vehicle.attend(1.0)
         process._publish_status()
-    said = [each for each in line.said if isinstance(each, CommandForwarded) and each.order == "motors off"]
+    said = [each for each in line.said if isinstance(each, CommandForwarded) and each.command.order == "motors off"]
     assert len([each for each in said if each.is_awaited]) == len(said) / 2
     return [each.problem for each in said if not each.is_awaited]
 

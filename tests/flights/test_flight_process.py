@@ -12,11 +12,12 @@ import pytest
 
 from app.autopilots.registry import get_experiment
 from app.common.data_folder import vehicle_lock
-from app.flights.flight_loop import FlightMonitor
-from app.flights.flight_process import FlightProcess, FlightProcessPool
+from app.core.clock import REAL_TIME
+from app.flights.flight_loop import FlightMonitor, run_simulations
+from app.flights.flight_process import FlightProcess
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import MAX_LINE_BYTES, FlightPhase, PublishedMessage, Telemetry, encode
-from app.processes.locks import exclusive
+from app.processes import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
@@ -43,7 +44,7 @@ def flight_of(*, kind: str = "twin", speed: float | None = None, trial_id: int =
 
 def start(data_dir: Path) -> FlightProcess:
     data_dir.mkdir(exist_ok=True)
-    return FlightProcessPool(data_dir, spare=0).acquire()
+    return FlightProcess(run_simulations, data_dir, REAL_TIME, name="flight")
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +186,7 @@ def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) 
 
     def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            os.kill(flight_process.pid or 0, signal.SIGKILL)
+            os.kill(flight_process._child._process.pid or 0, signal.SIGKILL)
 
     with pytest.raises(VehicleError, match=r"exit code -9"):
         fly(flight_process, flight_of(speed=1.0), kill)

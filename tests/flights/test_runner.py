@@ -16,7 +16,7 @@ from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow, VehicleRow
 from app.db.session import Database
 from app.fleet.service import hold_gains
-from app.flights.abort import AbortRegistry
+from app.flights.flight_process import FlightProcess
 from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import (
     FlightFailure,
@@ -27,7 +27,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.runner import FlightRunner
-from app.flights.worker_part import WorkerPart
+from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.live.messages import FlightPhase, PublishedMessage
 from app.vehicles.end_texts import end_text
 from app.vehicles.flight_end import StopRequest, withdrawn_by
@@ -55,7 +55,8 @@ class RunnerFixture:
                 worker="tests",
                 closing=threading.Event(),
                 clock=SimulatedClock(),
-            )
+            ),
+            session=self._session,
         )
 
     def fly_next(self) -> None:
@@ -65,7 +66,10 @@ class RunnerFixture:
 
     def kill_processes(self) -> None:
         for process in self.runner._process_pool._waiting:
-            os.kill(process.pid or 0, signal.SIGKILL)
+            os.kill(process._child._process.pid or 0, signal.SIGKILL)
+
+    def _session(self, vehicle_id: int) -> FlightProcess:
+        raise AssertionError(f"Vehicle {vehicle_id} is flown without a link.")
 
     def _hear(self, said: PublishedMessage) -> None:
         self.heard.append(said)

@@ -18,8 +18,8 @@ from app.db.session import Database
 from app.db.types import FLIGHT_END, utc_now
 from app.fleet import commands
 from app.flights import flight_rows
-from app.flights.flight_commands import record_abort
 from app.flights.flight_rows import FlightOutcome
+from app.flights.service import record_abort
 from app.live.link import LiveServer
 from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
 from app.main import create_app
@@ -67,7 +67,7 @@ def worker_link(settings: Settings) -> Iterator[LiveServer]:
 def report(client: TestClient, planned: Json, unready: UnreadyReason = "", *, battery_v: float = 11.8) -> None:
     """The vehicle's status arrives, as five times a second."""
     application: Any = client.app
-    while not application.state.live.worker_running:
+    while not application.state.live.client.connected:
         get(client, "/api/health")
     vehicle_id = get(client, f"/api/campaigns/{planned['campaign_id']}")["vehicle"]["id"]
     status = VehicleStatus(

@@ -31,7 +31,7 @@ def obeys(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     while isinstance(ordered := pipe.recv(), VehicleCommand):
         problem = "it knows no such block" if ordered.words == "drifts" else ""
-        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.words, problem))
+        pipe.send(CommandForwarded(ordered, problem))
 
 
 def is_busy(pipe: Connection, _call: ConnectionRequest) -> None:
@@ -39,7 +39,7 @@ def is_busy(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     first, second = pipe.recv(), pipe.recv()
     for ordered in (second, first):
-        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.words))
+        pipe.send(CommandForwarded(ordered))
     pipe.recv()
 
 
@@ -54,7 +54,7 @@ def dies_before_it_is_confirmed(pipe: Connection, _call: ConnectionRequest) -> N
     pipe.send(OPENED)
     for is_last in (False, True):
         ordered = pipe.recv()
-        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.words, is_awaited=True)
+        forwarded = CommandForwarded(ordered, is_awaited=True)
         pipe.send(forwarded)
         if not is_last:
             pipe.send(replace(forwarded, is_awaited=False))
@@ -66,7 +66,7 @@ def goes_on(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     pipe.send(STATUS)
     ordered = pipe.recv()
-    pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.words))
+    pipe.send(CommandForwarded(ordered))
     pipe.send(STATUS)
     pipe.recv()
 
@@ -118,8 +118,8 @@ def test_a_command_counts_as_executed_only_once_the_process_confirms_it(tmp_path
         stop = one.send_command("motors off", "people below", 1.0)
         assert (told(stop), told(land)) == ("", "")
         assert [heard.get(timeout=Waits.at_most_s) for _ in range(2)] == [
-            CommandForwarded(2, "motors off", "people below"),
-            CommandForwarded(1, "land", "it drifts"),
+            CommandForwarded(VehicleCommand(2, "motors off", "people below", 1.0)),
+            CommandForwarded(VehicleCommand(1, "land", "it drifts", 1.0)),
         ]
 
 
@@ -141,11 +141,9 @@ def test_a_command_whose_confirmation_the_process_did_not_live_to_see_is_told_as
             assert told(one.send_command("motors off", reason, 1.0)) == ""
         outcomes = [heard.get(timeout=Waits.at_most_s) for _ in range(2)]
         assert outcomes == [
-            CommandForwarded(1, "motors off", "to be sure"),
+            CommandForwarded(VehicleCommand(1, "motors off", "to be sure", 1.0)),
             CommandForwarded(
-                2,
-                "motors off",
-                "people below",
+                VehicleCommand(2, "motors off", "people below", 1.0),
                 "The process that had the vehicle's link ended before the vehicle confirmed it.",
             ),
         ]
@@ -163,7 +161,7 @@ def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(
             assert (silent.vehicle_id, silent.state, silent.step, silent.armed) == (5, "not answering", "record", True)
             assert "commands do not reach the vehicle" in silent.trouble
             assert "remote control" in silent.trouble
-        assert one.pid is not None
+        assert one._child._process.pid is not None
         one.send_command("land", "go on", 1.0)
         assert isinstance(next_but_silence(heard), CommandForwarded)
         assert next_but_silence(heard) == STATUS
@@ -185,6 +183,6 @@ def test_orders_to_a_process_that_reads_nothing_hold_up_nobody(tmp_path: Path) -
         answers = [one.send_command("land", "again and again", 1.0) for _ in range(5000)]
         assert not answers[0].done()
         assert "not responding" in told(answers[-1])
-        assert one.pid is not None
-        os.kill(one.pid, signal.SIGKILL)
+        assert one._child._process.pid is not None
+        os.kill(one._child._process.pid, signal.SIGKILL)
         assert "it is unknown whether the command was sent" in told(answers[0])

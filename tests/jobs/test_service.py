@@ -57,7 +57,7 @@ def test_a_silent_workers_job_waits_again_and_its_result_is_not_taken(database: 
     job = enqueue(database)
     assert claim(database, "a", lease_s=-1.0) == job
     with database.write() as session:
-        assert jobs.requeue_expired_jobs(session) == [job]
+        assert jobs.requeue_running_jobs(session, expired=True) == [job]
     assert claim(database, "b") == job
     with database.write() as session:
         assert not jobs.heartbeat_job(session, job, worker="a", lease_s=30.0)
@@ -71,7 +71,7 @@ def test_a_heartbeat_keeps_the_job(database: Database) -> None:
     claim(database, "a", lease_s=-1.0)
     with database.write() as session:
         assert jobs.heartbeat_job(session, job, worker="a", lease_s=30.0)
-        assert jobs.requeue_expired_jobs(session) == []
+        assert jobs.requeue_running_jobs(session, expired=True) == []
 
 
 def test_a_job_that_kills_its_workers_is_failed_after_three_times(database: Database) -> None:

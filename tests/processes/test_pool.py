@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.processes.pool import ComputePool, CrashedError
+from app.processes.calls import ComputePool, CrashedError
 
 LEAST_FAVOURED = 19
 """There is no greater niceness: see `man nice`."""

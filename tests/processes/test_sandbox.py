@@ -9,7 +9,7 @@ import pytest
 from app.campaigns.trials import records
 from app.common.errors import InputError, TrajectoryError
 from app.core.errors import Problem
-from app.processes.sandbox import FILE, Limits, run_limited
+from app.processes.calls import FILE, Limits, run_limited
 
 LITTLE = Limits(memory_bytes=2**27)
 BRIEF = Limits(processor_s=1)

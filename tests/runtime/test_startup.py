@@ -66,7 +66,7 @@ def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
 
 
 def test_processes_that_compute_and_fly_do_not_import_the_database() -> None:
-    modules = "app.campaigns.computation, app.processes.pool, app.flights.flight_process"
+    modules = "app.campaigns.computation, app.processes.calls, app.flights.flight_process"
     assert not imported(f"import {modules}").intersection((*NUMERICS, *DATABASE))
 
 

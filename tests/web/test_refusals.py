@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from app.common.schemas import Name
-from app.web.refusals import reason_of
+from app.web.errors import reason_of
 
 
 class Inner(BaseModel):

@@ -42,7 +42,7 @@ from app.db.models import TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
-from app.processes.sandbox import FILE, run_limited
+from app.processes.calls import FILE, run_limited
 from app.vehicles.flight_end import FlightEnd, Requester
 
 CURVE_POINTS: Final = 48

@@ -32,10 +32,10 @@ from app.web.dependencies import (
     Record,
     RequestContextDep,
     Writer,
+    described,
     json_only,
     of_app,
 )
-from app.web.downloads import described
 
 
 async def _trial_predictor(predictors: Annotated[PredictorCache, of_app("predictors")]) -> service.TrialPredictor:
