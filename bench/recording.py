@@ -33,7 +33,7 @@ from app.simdrone.drone import Drone, Server
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.ground_observation import GroundObservation
+from app.vehicles.mavlink.on_ground import GroundObservation
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialRunner
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

@@ -6,12 +6,13 @@ from typing import Final
 from app.autopilots.commands import Action
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, SafeGainsError, VehicleError
-from app.vehicles.mavlink import addresses, ground_observation, preflight, preparation
+from app.vehicles.mavlink import addresses, on_ground, preflight
 from app.vehicles.mavlink.failures import HELP
-from app.vehicles.mavlink.ground_observation import WATCHED_S, GroundObservation
-from app.vehicles.mavlink.observed_vehicle import LISTEN_S, ObservedVehicle
+from app.vehicles.mavlink.observed_vehicle import ObservedVehicle
+from app.vehicles.mavlink.on_ground import WATCHED_S, GroundObservation
 from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
-from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.radio import LISTEN_S
+from app.vehicles.mavlink.sent_commands import RepeatedCommand
 from app.vehicles.mavlink.trial_state import State
 
 _FURTHER_OBSERVATIONS: Final = 3
@@ -85,7 +86,7 @@ class VehicleConnection(ObservedVehicle):
         so. Raises SafeGainsError if it is armed, is another one, or does not accept them; VehicleError if it does not
         report its known hardware id."""
         self._identify()
-        preparation.require_disarmed(self._radio)
+        on_ground.require_disarmed(self._radio)
         if self._identity.is_another:
             raise SafeGainsError(self.concern, hint=_ANOTHER)
         self._identity.require_uid()
@@ -142,7 +143,7 @@ class VehicleConnection(ObservedVehicle):
     def _set_up(self) -> None:
         """Set up telemetry and safe gains. Raises VehicleError if the vehicle is armed, refuses, does not accept its
         safe gains, or holds others that no person has decided to overwrite."""
-        preparation.require_disarmed(self._radio)
+        on_ground.require_disarmed(self._radio)
         self._request_telemetry()
         if self._decided:
             self.restore()
@@ -167,16 +168,16 @@ class VehicleConnection(ObservedVehicle):
         self._identify()
         if not radio.reports_armed and not self._quarantine.is_active:
             self._request_telemetry()
-            preparation.make_armable(radio)
+            on_ground.make_armable(radio)
         watched = self._observe_standing(watched_s)
         for _ in range(_FURTHER_OBSERVATIONS):
             if self._quarantine.is_active or not (
-                preparation.make_armable(radio) or preparation.set_ground_reference(radio, watched)
+                on_ground.make_armable(radio) or on_ground.set_ground_reference(radio, watched)
             ):
                 break
             watched = self._observe_standing(watched_s)
         if not self._quarantine.is_active:
-            preparation.confirm_stop(radio, watched)
+            on_ground.confirm_stop(radio, watched)
         minimum_v, pinned = float(options["min_battery_v"]), self._identity.pinned
         items = preflight.evaluate_items(radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if pinned is not None and pinned.uid:
@@ -190,7 +191,7 @@ class VehicleConnection(ObservedVehicle):
         return watched.continued(radio), items
 
     def _observe_standing(self, watched_s: float) -> GroundObservation:
-        watched = ground_observation.observe(self._radio, self._secondary, watched_s=watched_s)
+        watched = on_ground.observe(self._radio, self._secondary, watched_s=watched_s)
         self._identify()
         return watched
 

@@ -12,21 +12,19 @@ from app.core.policy import Gains
 from app.vehicles.base import Identity, VehicleError
 from app.vehicles.end_texts import requested
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import parameters, preparation
+from app.vehicles.mavlink import on_ground, parameters
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
-from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
-from app.vehicles.mavlink.opening import open_radio
 from app.vehicles.mavlink.parameters import GainStore
 from app.vehicles.mavlink.quarantine import Quarantine
-from app.vehicles.mavlink.repeated_command import STOPPING_S, RepeatedCommand
+from app.vehicles.mavlink.radio import LISTEN_S, open_radio
+from app.vehicles.mavlink.sent_commands import STOPPING_S, RepeatedCommand, set_up
 from app.vehicles.mavlink.status_reader import StatusReader
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial_state import State
 
-LISTEN_S: Final = 0.1
 _POSITIONS_CEASED_S: Final = 2.0
 _NOT_STOPPED: Final = f"The vehicle has not confirmed within {STOPPING_S:g} s that its motors stopped."
 _DROPPED: Final = "The vehicle was not known to be on the ground: inspect it before it flies again."
@@ -169,7 +167,7 @@ class ObservedVehicle(ABC):
         change = self._identity.change
         if self._quarantine.is_active:
             self._quarantine.add(change)
-        elif why := f"{preparation.ARMED if self._radio.is_armed else ''} {change}".strip():
+        elif why := f"{on_ground.ARMED if self._radio.is_armed else ''} {change}".strip():
             self._observe(why)
 
     def _identify(self) -> None:

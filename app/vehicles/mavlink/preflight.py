@@ -23,9 +23,15 @@ from app.vehicles.base import (
 )
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.boot_clock import unwrapped
-from app.vehicles.mavlink.ground_observation import STANDS_WITHIN_M, GroundObservation, find_reception
+from app.vehicles.mavlink.on_ground import (
+    ARMED,
+    LAND_FIRST,
+    ONE_VEHICLE,
+    STANDS_WITHIN_M,
+    GroundObservation,
+    find_reception,
+)
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE
 from app.vehicles.mavlink.radio import AutopilotLink
 
 POSITIONS_HZ: Final = 40.0
@@ -112,7 +118,11 @@ def evaluate_items(
         items += [FLIGHT_PLAN.item(not plan_problem, plan_problem or blocks, blocks), _ground_reference(radio, watched)]
     if radio.profile.stop_settings:
         items.append(_stopping(radio))
-    return (*items, *_own_checks(radio), *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
+    return (
+        *items,
+        *_own_checks(radio),
+        *(evaluate_requirement(radio, requirement) for requirement in radio.profile.requirements),
+    )
 
 
 def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
@@ -149,11 +159,6 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
         hint="Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
         f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
     )
-
-
-def evaluate_set_point_requirements(radio: AutopilotLink) -> tuple[CheckItem, ...]:
-    """Read and check the further requirements of a flight with several set points."""
-    return tuple(_failsafe(radio, requirement) for requirement in radio.profile.set_point_requirements)
 
 
 def evaluate_set_points(set_points: SetPoints) -> CheckItem:
@@ -303,7 +308,8 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
     return GROUND_REFERENCE.item(is_set and watched.is_at_reference, found, needed)
 
 
-def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
+def evaluate_requirement(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
+    """Read the parameter of a requirement and check it."""
     parameter = radio.target.newer_names.get(requirement.parameter, requirement.parameter)
     value = read_parameter(radio, parameter)
     off = " (off)" if value == 0.0 and not requirement.values else ""

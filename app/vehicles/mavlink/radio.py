@@ -1,22 +1,39 @@
-"""Communication with one vehicle by its profile: repeated requests, one in flight at a time, and reception."""
+"""Communication with one vehicle by its profile: opening of its link by its options, repeated requests, one in flight
+at a time, and reception.
+"""
 
+import datetime as dt
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Final
 
+from app.autopilots import signing
 from app.autopilots.autopilot import Autopilot, AutopilotError, HoverLimits
 from app.autopilots.commands import Outgoing, Target
 from app.autopilots.dialects import Message, source_component
 from app.autopilots.measurements import BlockEntered, Heartbeat, Measurement
-from app.core.clock import Clock
+from app.autopilots.registry import AUTOPILOTS
+from app.core.clock import Clock, ScaledClock
 from app.vehicles.base import VehicleError
+from app.vehicles.kinds import Options
+from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HEARTBEATS_MISSED
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.memory import VehicleMemory
+from app.vehicles.mavlink.transports import Transport
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
 JUST_HEARD_S: Final = 0.1
+LISTEN_S: Final = 0.1
+"""Longest time for which an operation that waits receives at a go."""
+HEARTBEAT_WITHIN_S: Final = 5.0
+"""Time within which a vehicle that is on is heard."""
+TAKEOFF_ALTITUDE_M: Final = 3.0
+MAX_UNSCALED_SPEED: Final = 4.0
+"""Up to this clock speed the timeouts of a simulated vehicle are those of a real one. Beyond, they are longer by its
+clock, because the pauses of a busy computer are in wall time."""
 _PAUSE_S: Final = 0.2
 _REFERENCE_TAKES_S: Final = 4.0
 """Least time in which a flight plan sets its ground reference: 10 s in the stock plans, but fewer by the clock of the
@@ -170,3 +187,57 @@ class AutopilotLink:
                     if packet.measurement is not None and fits(packet.measurement):
                         return packet.measurement
         return None
+
+
+def open_radio(
+    options: Options,
+    clock: Clock | None,
+    *,
+    on_message: Callable[[Received], None] | None,
+    on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
+    is_silent: Callable[[], bool] = lambda: False,
+    transport: Transport | None = None,
+) -> AutopilotLink:
+    """Open the link to a vehicle.
+
+    `clock` is the vehicle's time, by default that of its options; for `on_message` and `on_wait` see AutopilotLink;
+    no heartbeats are sent while `is_silent` returns true; `transport` replaces the address and the thread that reads
+    it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
+    used.
+    """
+    profile = AUTOPILOTS[str(options["autopilot"])]
+    clock = clock or ScaledClock(float(options["clock_speed"]))
+    key_file = str(options["signing_key_file"])
+    link = Link(
+        addresses.parse(str(options["address"])),
+        profile.dialect,
+        clock=clock,
+        target_system=int(options["system_id"]) or None,
+        make=profile.autopilot,
+        tlog=_log_path(str(options["log_folder"])),
+        signing_key=signing.read_key(Path(key_file)) if key_file else None,
+        transport=transport,
+        is_silent=is_silent,
+    )
+    target = Target(
+        system=0,
+        aircraft=int(options["aircraft_id"]),
+        waypoint=int(options["climb_waypoint"]),
+        altitude_m=TAKEOFF_ALTITUDE_M,
+    )
+    return AutopilotLink(
+        link,
+        profile,
+        clock,
+        target,
+        reply_timeout_s=REPLY_TIMEOUT_S * max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED),
+        on_message=on_message,
+        on_wait=on_wait,
+    )
+
+
+def _log_path(folder: str) -> Path | None:
+    """Return a new file name for every opening, with its time in UTC; None without a folder."""
+    if not folder:
+        return None
+    return Path(folder) / f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"

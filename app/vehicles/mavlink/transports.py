@@ -96,11 +96,7 @@ class UdpTransport:
             self._socket.close()
             raise _cannot_open(f"udp port {local[1]} of {local[0]}", error) from error
         self._waiter = _Waiter()
-        self._remote = remote
-
-    @property
-    def remote(self) -> Peer | None:
-        return self._remote
+        self.remote = remote
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         datagrams: list[tuple[bytes, Peer]] = []
@@ -112,16 +108,16 @@ class UdpTransport:
         return datagrams
 
     def write(self, data: bytes) -> bool:
-        if self._remote is None:
+        if self.remote is None:
             return False
         try:
-            self._socket.sendto(data, self._remote)
+            self._socket.sendto(data, self.remote)
         except OSError:  # the buffer is full or the network is down; the next one may succeed
             return False
         return True
 
     def adopt(self, peer: Peer) -> None:
-        self._remote = peer
+        self.remote = peer
 
     def wake(self) -> None:
         self._waiter.wake()
@@ -143,7 +139,7 @@ class StreamTransport:
 
     def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
         """Open the stream by `opened`, which raises OSError on failure. Raises LinkError if that fails now."""
-        self._peer = peer
+        self.remote: Final = peer
         self._opened = opened
         try:
             self._stream: _Stream | None = opened()
@@ -155,10 +151,6 @@ class StreamTransport:
         self._writing = threading.Lock()
         self._backlog = bytearray()
         self._is_broken = False
-
-    @property
-    def remote(self) -> Peer | None:
-        return self._peer
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         if self._is_broken:
@@ -172,7 +164,7 @@ class StreamTransport:
             with self._writing:
                 self._flush(self._stream)
         data = self._receive(self._stream) if is_readable else b""
-        return [(data, self._peer)] if data else []
+        return [(data, self.remote)] if data else []
 
     def write(self, data: bytes) -> bool:
         with self._writing:

@@ -30,9 +30,8 @@ from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.mavlink_kind import MAVLINK
+from app.vehicles.mavlink_kind import MAVLINK, open_source
 from app.vehicles.mocap.addresses import parse as parse_source
-from app.vehicles.mocap.opening import open_source
 from bench.lockstep import Lockstep
 from tests.ports import free_port
 from tests.simdrone.ground import switched_on

@@ -27,13 +27,13 @@ from app.autopilots.dialects import (
 from app.core.clock import ScaledClock
 from app.core.errors import InputError
 from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
+from app.vehicles.mavlink.duplicate_vehicle import GONE_AFTER_S, INTERVAL_S
 from app.vehicles.mavlink.link import (
     MAX_QUEUED_MESSAGES,
     UNATTENDED_AFTER_S,
     Link,
 )
 from app.vehicles.mavlink.link_health import LossCounter
-from app.vehicles.mavlink.other_peers import GONE_AFTER_S, INTERVAL_S
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
 from tests.vehicles.mavlink.replaying import FLOWN, recorded

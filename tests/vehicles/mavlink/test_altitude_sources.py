@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.vehicles.mocap.stream import ClockOffset, PoseStream
+from app.vehicles.mavlink.altitude_sources import ClockOffset, PoseStream
 
 
 def put(stream: PoseStream, time_s: float, altitude_m: float, *, arrived_s: float | None = None) -> None:
