@@ -160,7 +160,8 @@ def free_port() -> int:
 
 def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[FlightRecord, Counter[int]]:
     """Fly a whole trial and return its record, with the count of each time stamp in it."""
-    vehicle = LongRecord(options, GAINS[autopilot], is_real=False)
+    clock = ScaledClock(float(options["clock_speed"]))
+    vehicle = LongRecord(options, GAINS[autopilot], is_real=False, clock=clock)
     try:
         vehicle.stage(GAINS[autopilot])
         order = FlightOptions(seed=1, window_s=meter.until_s - RECORDED_BEYOND_S)

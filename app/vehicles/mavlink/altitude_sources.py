@@ -9,7 +9,7 @@ import statistics
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.link import Received
@@ -41,24 +41,15 @@ class SourceSample:
     advances: bool
 
 
-class AltitudeSource(Protocol):
-    """Second source of altitude, which receives in its own thread or through `on_message`; no method waits."""
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Pose at a time of the source's clock; altitude is positive up from the source's zero; `values` are all components
+    that it sent."""
 
-    @property
-    def name(self) -> str:
-        """Description for the operator: what it is and where it is received."""
-
-    @property
-    def trouble(self) -> str:
-        """Reason why no samples arrive, if known; otherwise empty."""
-
-    def on_message(self, received: Received) -> None:
-        """Process a message of the vehicle's own link; a source with its own link ignores it."""
-
-    def take(self) -> Sequence[SourceSample]:
-        """Return the samples since the last call, oldest first."""
-
-    def close(self) -> None: ...
+    time_s: float
+    altitude_m: float
+    values: tuple[float, ...]
+    tracking_valid: bool
 
 
 class ClockOffset:
@@ -82,36 +73,51 @@ class ClockOffset:
         return time_s + self._fastest[0][1]
 
 
-class PoseStream:
-    """Queue that converts poses into samples; one thread may put while another takes.
+class AltitudeSource:
+    """Second source of altitude, which receives poses in its own thread or through `on_message`; no method waits.
 
-    A pose is new if its time has advanced and it differs from the previous one in at least one bit: measured poses
-    always differ, but a system that has lost a body may repeat the last pose.
+    Poses are queued as samples; one thread may `put` while another takes. A pose is new if its time has advanced and it
+    differs from the previous one in at least one bit: measured poses always differ, but a system that has lost a body
+    may repeat the last pose. The altitudes are converted to the vehicle's datum by their values on the ground.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
+        self.name: Final = name
+        """Description for the operator: what it is and where it is received."""
         self._samples: deque[SourceSample] = deque(maxlen=KEPT)
         self._arrivals = ClockOffset()
         self._time_s = float("-inf")
-        self._pose: tuple[float, ...] = ()
+        self._values: tuple[float, ...] = ()
         self.newest: SourceSample | None = None
         """The last sample put, taken or not."""
+        self.seen: list[tuple[float, float]] = []
+        """The samples of the flight so far, as `SourceSample.measured_s` and altitude (m) on the vehicle's datum."""
+        self._rise_m = 0.0
 
-    def put(
-        self, altitude_m: float, pose: tuple[float, ...], *, time_s: float, arrived_s: float, tracking_valid: bool
-    ) -> None:
-        """Add a pose; `time_s` is by the source's clock, `arrived_s` by ours. A non-finite altitude counts as not
-        tracked."""
+    @property
+    def trouble(self) -> str:
+        """Reason why no samples arrive, if known; otherwise empty."""
+        return ""
+
+    def on_message(self, received: Received) -> None:
+        """Process a message of the vehicle's own link; a source with its own link ignores it."""
+
+    def close(self) -> None:
+        """Close what is received from, unless it belongs to the vehicle."""
+
+    def put(self, pose: Pose, arrived_s: float) -> None:
+        """Add a pose, which arrived at that time of our clock. A non-finite altitude counts as not tracked."""
+        time_s = pose.time_s
         later = math.isfinite(time_s) and (time_s > self._time_s or time_s < self._time_s - _RESTART_S)
         sample = SourceSample(
             received_s=arrived_s,
             measured_s=self._arrivals.measured_s(time_s, arrived_s) if later else arrived_s,
-            altitude_m=altitude_m,
-            tracking_valid=tracking_valid and math.isfinite(altitude_m),
-            advances=later and not _is_same(pose, self._pose),
+            altitude_m=pose.altitude_m,
+            tracking_valid=pose.tracking_valid and math.isfinite(pose.altitude_m),
+            advances=later and not _is_same(pose.values, self._values),
         )
         if later:
-            self._time_s, self._pose = time_s, pose
+            self._time_s, self._values = time_s, pose.values
         self.newest = sample
         self._samples.append(sample)
 
@@ -119,39 +125,20 @@ class PoseStream:
         """Return the samples since the last call, oldest first."""
         return [self._samples.popleft() for _ in range(len(self._samples))]
 
-
-def _is_same(pose: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Whether two poses are equal bit by bit; NaN (missing) equals NaN."""
-    return len(pose) == len(other) and all(
-        a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(pose, other, strict=True)
-    )
-
-
-class AlignedAltitudeSource:
-    """Source whose altitudes are converted to the vehicle's datum by their values on the ground.
-
-    `seen` are the samples of the flight so far, as `SourceSample.measured_s` and altitude (m) on the vehicle's datum.
-    """
-
-    def __init__(self, source: AltitudeSource) -> None:
-        self.source = source
-        self.seen: list[tuple[float, float]] = []
-        self._rise_m = 0.0
-
     def ground_altitudes(self) -> tuple[float, ...]:
         """Return the valid altitudes since the last call, on the source's datum."""
-        return tuple(sample.altitude_m for sample in self.source.take() if sample.tracking_valid and sample.advances)
+        return tuple(sample.altitude_m for sample in self.take() if sample.tracking_valid and sample.advances)
 
     def align(self, stood_m: Sequence[float], ground_m: float) -> None:
         """Begin a flight: `stood_m` are the source's altitudes of the vehicle on the ground, which is at `ground_m` on
         the vehicle's datum."""
         self._rise_m = ground_m - statistics.median(stood_m)
         self.seen.clear()
-        self.source.take()
+        self.take()
 
     def take_samples(self) -> list[SecondaryAltitudeReceived]:
         """Return the samples since the last call as events."""
-        samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.source.take()]
+        samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.take()]
         self.seen += [(sample.measured_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]
         return [
             SecondaryAltitudeReceived(
@@ -159,3 +146,10 @@ class AlignedAltitudeSource:
             )
             for sample, is_new in samples
         ]
+
+
+def _is_same(pose: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Whether two poses are equal bit by bit; NaN (missing) equals NaN."""
+    return len(pose) == len(other) and all(
+        a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(pose, other, strict=True)
+    )

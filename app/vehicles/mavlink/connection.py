@@ -9,7 +9,6 @@ from app.vehicles.base import CheckItem, SafeGainsError, VehicleError
 from app.vehicles.mavlink import addresses, on_ground, preflight
 from app.vehicles.mavlink.failures import HELP
 from app.vehicles.mavlink.observed_vehicle import ObservedVehicle
-from app.vehicles.mavlink.on_ground import WATCHED_S, GroundObservation
 from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
 from app.vehicles.mavlink.radio import LISTEN_S
 from app.vehicles.mavlink.sent_commands import RepeatedCommand
@@ -38,8 +37,10 @@ class VehicleConnection(ObservedVehicle):
     def _open(self, *, observes: bool) -> None:
         self._parameters = self._trial_parameters()
         self._connect()
+        if not observes and self._quarantine.is_active:
+            raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
         if not observes:
-            self._require_ready()
+            preflight.require(self.check())
 
     def _connect(self) -> None:
         self._identity.await_vehicle(str(self._options["address"]))
@@ -48,9 +49,7 @@ class VehicleConnection(ObservedVehicle):
         self._listen(0.0)
         if self._was_flying:
             self._take_up_landing()
-        if self._quarantine.is_active:
-            return
-        if self._has_set_safe_gains():
+        if not self._quarantine.is_active and self._has_set_safe_gains():
             self._quarantine.enter(State.SET_GAINS)
             self._quarantine.enter(State.IDLE)
             self._quarantine.requested, self._repeated, self._was_flying = "", None, False
@@ -72,12 +71,6 @@ class VehicleConnection(ObservedVehicle):
         return TrialParameters(
             self._radio, lambda: files_for(folder, address, self.identity, is_simulated=is_simulated)
         )
-
-    def _require_ready(self) -> None:
-        """Raise SafeGainsError while it may only be observed, VehicleError if it is not ready to fly."""
-        if self._quarantine.is_active:
-            raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
-        preflight.require(self.check())
 
     # ---- safe gains
 
@@ -161,9 +154,9 @@ class VehicleConnection(ObservedVehicle):
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
         error. Raises LinkError if the link is closed."""
-        return self._check(WATCHED_S)[1]
+        return self._check(on_ground.WATCHED_S)[1]
 
-    def _check(self, watched_s: float) -> tuple[GroundObservation, tuple[CheckItem, ...]]:
+    def _check(self, watched_s: float) -> tuple[on_ground.GroundObservation, tuple[CheckItem, ...]]:
         radio, options = self._radio, self._options
         self._identify()
         if not radio.reports_armed and not self._quarantine.is_active:
@@ -190,7 +183,7 @@ class VehicleConnection(ObservedVehicle):
         items = (*items, self._gains.check())
         return watched.continued(radio), items
 
-    def _observe_standing(self, watched_s: float) -> GroundObservation:
+    def _observe_standing(self, watched_s: float) -> on_ground.GroundObservation:
         watched = on_ground.observe(self._radio, self._secondary, watched_s=watched_s)
         self._identify()
         return watched

@@ -32,10 +32,9 @@ class VehicleIdentity:
     def reported(self) -> Identity:
         """Identity as reported, which may take some time; parts not reported are those of the pinned identity."""
         radio, seen = self._radio, self._radio.seen
-        identity = Identity(
+        return Identity(
             system_id=radio.target.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid
-        )
-        return identity.completed_by(self.pinned)
+        ).completed_by(self.pinned)
 
     @property
     def change(self) -> str:
@@ -78,7 +77,8 @@ class VehicleIdentity:
         reply, and Paparazzi sends them unrequested; if the pinned vehicle has a hardware id, it is requested for 5
         s."""
         radio = self._radio
-        radio.receive_pending()
+        radio.listen(0.0)
+        radio.forget_absent(radio.clock.now_s())
         is_needed = bool(self.missing_uid)
         if radio.profile.reports_version and (is_needed or not (radio.seen.version or radio.seen.uid)):
             attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS

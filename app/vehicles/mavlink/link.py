@@ -11,8 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 from app.autopilots.dialects import (
     BAD_DATA,
@@ -31,8 +30,7 @@ from app.autopilots.dialects import (
 )
 from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.duplicate_vehicle import GONE_AFTER_S, DuplicateDetector
-from app.vehicles.mavlink.link_health import LinkHealth, LossCounter
+from app.vehicles.mavlink.reception import GONE_AFTER_S, DuplicateDetector, LinkHealth, LossCounter
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
@@ -116,14 +114,6 @@ class Link:
         if transport is None:
             self._thread = threading.Thread(target=self._run, name=f"link {address}", daemon=True)
             self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def duplicate_reason(self) -> str:
@@ -310,9 +300,8 @@ class Link:
         if self._make not in (None, make):
             self._other_makes.add(make)
             return False
-        system, component = self._vehicle_system, self._vehicle_component
-        is_it = system is None or source_system(message) == system
-        return is_it and (component is None or source_component(message) == component)
+        is_its_system = self._vehicle_system in (None, source_system(message))
+        return is_its_system and self._vehicle_component in (None, source_component(message))
 
     def _queue(self, messages: list[Message]) -> None:
         now_s = self._clock.now_s()

@@ -11,7 +11,7 @@ from typing import Final
 from app.autopilots import commands
 from app.autopilots.measurements import DISARMING, CommandReply, Heartbeat, Position
 from app.vehicles.base import SafeGainsError
-from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
+from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mavlink.radio import HEARTBEAT_WITHIN_S, LISTEN_S, AutopilotLink
 from app.vehicles.mavlink.sent_commands import set_up
 
@@ -79,12 +79,12 @@ class GroundObservation:
 
 
 def observe(
-    radio: AutopilotLink, secondary: AlignedAltitudeSource | None, *, watched_s: float = WATCHED_S
+    radio: AutopilotLink, secondary: AltitudeSource | None, *, watched_s: float = WATCHED_S
 ) -> GroundObservation:
     """Receive for `watched_s`, and for up to 10 s until there is a battery voltage and a heartbeat."""
     radio.listen(0.0)
     if secondary is not None:
-        secondary.source.take()
+        secondary.take()
     begun_s = radio.clock.now_s()
     armed: list[bool] = []
     while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
@@ -127,9 +127,8 @@ def find_reception(positions: Sequence[tuple[float, Position]], now_s: float) ->
 def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
     """Find out whether a vehicle without a setting that stops its motors accepts the command that does. The command is
     sent only if the vehicle was just observed standing, disarmed by every heartbeat: in the air, it would fall."""
-    if radio.target.stop_settings or not radio.profile.stop_settings or radio.link.duplicate_reason:
-        return
-    if watched.stands:
+    is_needed = radio.profile.stop_settings and not radio.target.stop_settings
+    if is_needed and not radio.link.duplicate_reason and watched.stands:
         reply = radio.request(
             commands.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING
         )

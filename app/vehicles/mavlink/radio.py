@@ -3,18 +3,17 @@ at a time, and reception.
 """
 
 import datetime as dt
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from app.autopilots import signing
-from app.autopilots.autopilot import Autopilot, AutopilotError, HoverLimits
+from app.autopilots.autopilot import Autopilot
 from app.autopilots.commands import Outgoing, Target
-from app.autopilots.dialects import Message, source_component
+from app.autopilots.dialects import source_component
 from app.autopilots.measurements import BlockEntered, Heartbeat, Measurement
 from app.autopilots.registry import AUTOPILOTS
-from app.core.clock import Clock, ScaledClock
-from app.vehicles.base import VehicleError
+from app.core.clock import Clock
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.events import PacketReceived
@@ -43,9 +42,10 @@ ground if a simulation is fast, or reports arrive again late."""
 class AutopilotLink:
     """Link to an autopilot by its profile, for use by one thread.
 
-    Replies are waited for `reply_timeout_s`. Only messages of the autopilot's own component are measured; `on_message`
-    is called with every message of any component. Operations that wait for the vehicle call `listen`, which calls
-    `on_wait` with the packets received, at least every `reply_timeout_s`; an exception from it ends the operation.
+    Replies are waited for `reply_timeout_s`. Only messages of the autopilot's own component are measured, or of any
+    while that is unknown; `on_message` is called with every message of any component. Operations that wait for the
+    vehicle call `listen`, which calls `on_wait` with the packets received, at least every `reply_timeout_s`; an
+    exception from it ends the operation.
     """
 
     def __init__(
@@ -118,13 +118,6 @@ class AutopilotLink:
         names = {number: name for name, number in self.target.blocks.items()}
         return "" if self.seen.block is None else names.get(self.seen.block, f"block {self.seen.block}")
 
-    def hover_limits(self, parameters: Mapping[str, float]) -> HoverLimits | None:
-        """Return those of `Autopilot.hover_limits`. Raises VehicleError for a parameter out of its range."""
-        try:
-            return self.profile.hover_limits(parameters)
-        except AutopilotError as error:
-            raise VehicleError(error.message, hint=error.hint) from error
-
     def send(self, *messages: Outgoing) -> None:
         """Send messages. Raises LinkError if the link is closed."""
         for message in messages:
@@ -150,29 +143,20 @@ class AutopilotLink:
         packets = [
             PacketReceived(self.profile.measure(received.message), received.received_s)
             for received in messages
-            if self._is_autopilots(received.message)
+            if self.target.component in (0, source_component(received.message))
         ]
         for each in packets:
             if isinstance(each.measurement, Heartbeat):
-                self._forget_absent(each.now_s)
+                self.forget_absent(each.now_s)
             if isinstance(each.measurement, BlockEntered):
                 self._note_ground_reference(each.measurement.number, each.now_s)
             self.seen.note(each.measurement, each.now_s)
         return packets
 
-    def receive_pending(self) -> None:
-        """Process the packets that have arrived, and discard the identity of an absent vehicle."""
-        self.listen(0.0)
-        self._forget_absent(self.clock.now_s())
-
-    def _forget_absent(self, now_s: float) -> None:
+    def forget_absent(self, now_s: float) -> None:
         """Discard the identity after an absence, because another vehicle may take its place."""
         if now_s - self.seen.heartbeat_s > self.silence_s:
             self.seen.forget_vehicle()
-
-    def _is_autopilots(self, message: Message) -> bool:
-        """Whether the message is of the autopilot's component, or of any while that is unknown."""
-        return self.target.component in (0, source_component(message))
 
     def request(
         self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
@@ -191,7 +175,7 @@ class AutopilotLink:
 
 def open_radio(
     options: Options,
-    clock: Clock | None,
+    clock: Clock,
     *,
     on_message: Callable[[Received], None] | None,
     on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
@@ -200,21 +184,21 @@ def open_radio(
 ) -> AutopilotLink:
     """Open the link to a vehicle.
 
-    `clock` is the vehicle's time, by default that of its options; for `on_message` and `on_wait` see AutopilotLink;
+    `clock` is the vehicle's time; for `on_message` and `on_wait` see AutopilotLink;
     no heartbeats are sent while `is_silent` returns true; `transport` replaces the address and the thread that reads
     it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
     used.
     """
     profile = AUTOPILOTS[str(options["autopilot"])]
-    clock = clock or ScaledClock(float(options["clock_speed"]))
-    key_file = str(options["signing_key_file"])
+    key_file, log_folder = str(options["signing_key_file"]), str(options["log_folder"])
+    log_name = f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"  # a new one for every opening
     link = Link(
         addresses.parse(str(options["address"])),
         profile.dialect,
         clock=clock,
         target_system=int(options["system_id"]) or None,
         make=profile.autopilot,
-        tlog=_log_path(str(options["log_folder"])),
+        tlog=Path(log_folder) / log_name if log_folder else None,
         signing_key=signing.read_key(Path(key_file)) if key_file else None,
         transport=transport,
         is_silent=is_silent,
@@ -234,10 +218,3 @@ def open_radio(
         on_message=on_message,
         on_wait=on_wait,
     )
-
-
-def _log_path(folder: str) -> Path | None:
-    """Return a new file name for every opening, with its time in UTC; None without a folder."""
-    if not folder:
-        return None
-    return Path(folder) / f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"

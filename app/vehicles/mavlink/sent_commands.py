@@ -71,7 +71,8 @@ class CommandSequence:
             elif not step.needed:
                 self._next(now_s)
             elif step.attempts > 1:
-                return self._unanswered()
+                why = f"The vehicle did not reply to the command to {self._description}."
+                return ActionRefused(self._action, why, self._radio.clock.now_s())
         return None
 
     def _verdict(self, measurement: Measurement | None) -> bool | None:
@@ -113,10 +114,6 @@ class CommandSequence:
         return ActionRefused(
             self._action, f"The vehicle refused to {self._description} ({why}).{texts}", self._radio.clock.now_s()
         )
-
-    def _unanswered(self) -> ActionRefused:
-        why = f"The vehicle did not reply to the command to {self._description}."
-        return ActionRefused(self._action, why, self._radio.clock.now_s())
 
 
 def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
@@ -193,7 +190,8 @@ class RepeatedCommand:
         is_late = self.action is Action.KILL and now_s - self._requested_s > STOPPING_S
         self.has_stopped = self.has_stopped or self._has_stopped()
         self.is_over = self.is_over or is_late or self.has_stopped or self._has_landed(now_s)
-        is_due = now_s - self._sent_s >= self._every_s(now_s)
+        lands_every_s = land_every_s(now_s - self._requested_s, self._radio.profile.land_again_s)
+        is_due = now_s - self._sent_s >= (lands_every_s if self.action is Action.LAND else REPEAT_S)
         held_up = self.is_withheld or self._landing_since_s is not None or self._may_be_by_hand(now_s)
         if is_due and not held_up and not self.is_over:
             self._send()
@@ -227,11 +225,6 @@ class RepeatedCommand:
                 self.is_over = self.is_over or flown == "by a pilot"
                 if self.is_withheld and flown == "as in a trial":
                     self.is_withheld, self._requested_s = False, packet.now_s
-
-    def _every_s(self, now_s: float) -> float:
-        if self.action is Action.LAND:
-            return land_every_s(now_s - self._requested_s, self._radio.profile.land_again_s)
-        return REPEAT_S
 
     def _send(self) -> None:
         """Send every message once, without waiting for a reply."""

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.autopilot import AutopilotError
 from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
@@ -19,9 +20,7 @@ from app.vehicles.mavlink.connection import VehicleConnection
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference, with_flown_set_points
-from app.vehicles.mavlink.on_ground import GroundObservation
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
 from app.vehicles.mavlink.sent_commands import RepeatedCommand, set_up
 from app.vehicles.mavlink.set_point_schedule import referred_from_s, with_hold
 from app.vehicles.mavlink.transports import LinkError
@@ -61,7 +60,7 @@ class MavlinkVehicle(VehicleConnection):
         troubles = (
             f"The telemetry log {problem}." if problem else "",
             _RESTARTED if self._gains.have_restarted and self._flight is None else "",
-            self._secondary.source.trouble if self._secondary is not None else "",
+            self._secondary.trouble if self._secondary is not None else "",
             self._flight.trouble if self._flight is not None else "",
             self._repeated.trouble if self._repeated is not None else "",
         )
@@ -174,10 +173,9 @@ class MavlinkVehicle(VehicleConnection):
             reference(order.set_points, np.zeros(1))
         self._identify()
         self._quarantine.require_none()
-        release = self._gains.release
         set_up(radio, tuple(each.step(radio.target) for each in profile.set_point_telemetry))
         if profile.loop_parameters:
-            self._loop = parameters.read_loop(radio, profile.loop_parameters[release], profile.may_lack)
+            self._loop = parameters.read_loop(radio, profile.loop_parameters[self._gains.release], profile.may_lack)
 
     def _reference(self, order: FlightOptions, ground_m: float) -> Reference | None:
         """Return the function that computes the autopilot's own reference; None if it sends that, or if it is not
@@ -186,13 +184,17 @@ class MavlinkVehicle(VehicleConnection):
             return None
         return lambda set_points, time_s: simulate_reference(set_points, ground_m, time_s, order.record_s)
 
-    def _observe_ground(self, order: FlightOptions) -> GroundObservation:
+    def _observe_ground(self, order: FlightOptions) -> on_ground.GroundObservation:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         radio = self._radio
         further = radio.profile.set_point_requirements if _flies_steps(order) else ()
         needed = [preflight.evaluate_requirement(radio, requirement) for requirement in further]
         watched, items = self._check(STANDSTILL_S)
-        needed += preflight.evaluate_hover(self._hover_throttle, radio.hover_limits(self._loop))
+        try:
+            limits = radio.profile.hover_limits(self._loop)
+        except AutopilotError as error:
+            raise VehicleError(error.message, hint=error.hint) from error
+        needed += preflight.evaluate_hover(self._hover_throttle, limits)
         if radio.profile.flying_blocks:
             plan_time_s = float(self._options["plan_time_s"])
             needed.insert(0, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
@@ -202,7 +204,7 @@ class MavlinkVehicle(VehicleConnection):
 
     def _fly(
         self,
-        ground: GroundObservation,
+        ground: on_ground.GroundObservation,
         order: FlightOptions,
         reference: Reference | None,
         on_sample: Callable[[Sample], None],
@@ -244,7 +246,7 @@ class MavlinkVehicle(VehicleConnection):
             self._keep_landing(flown.trial)
         return flown
 
-    def _plan(self, order: FlightOptions, ground: GroundObservation) -> Plan:
+    def _plan(self, order: FlightOptions, ground: on_ground.GroundObservation) -> Plan:
         """Return the plan of a flight from there, with the set points of the order."""
         profile, target = self._radio.profile, self._radio.target
         holds = _flies_steps(order) and profile.holds_first
@@ -275,10 +277,10 @@ class MavlinkVehicle(VehicleConnection):
     # ---- records
 
     @property
-    def _scored(self) -> Scored:
+    def _scored(self) -> records.Scored:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
-    def _record(self, flown: TrialRunner, ground: GroundObservation) -> FlightRecord:
+    def _record(self, flown: TrialRunner, ground: on_ground.GroundObservation) -> FlightRecord:
         """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
         aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
@@ -301,10 +303,10 @@ class MavlinkVehicle(VehicleConnection):
         if records.ending_of(trial) == "completed":
             found = records.hover_throttle_of(own, until_s=referred_from_s(plan) + SETTLED_FOR_S)
             self._hover_throttle = self._hover_throttle if found is None else found
-        both = AlignedRecord(trajectory=own)
+        both = records.AlignedRecord(trajectory=own)
         if self._secondary is not None:
-            zero_s, name = start_s + flown.offset_s, self._secondary.source.name
-            both = add_secondary_altitude(
+            zero_s, name = start_s + flown.offset_s, self._secondary.name
+            both = records.add_secondary_altitude(
                 both.trajectory, self._secondary.seen, name=name, zero_s=zero_s, scored=self._scored
             )
         lands = self._repeated is not None and self._repeated.action is Action.LAND
@@ -315,7 +317,7 @@ class MavlinkVehicle(VehicleConnection):
             settings={**self._options, **self._loop, **both.settings},
         )
 
-    def _not_begun(self, ground: GroundObservation, end: FlightEnd) -> FlightRecord:
+    def _not_begun(self, ground: on_ground.GroundObservation, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         datum_m = ground.altitude_m if self._radio.profile.climbs_from_ground else 0.0

@@ -12,8 +12,7 @@ from natnet import NatNetClient, NatNetError, Version
 
 from app.core.clock import Clock
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.altitude_sources import SILENT_S, PoseStream
-from app.vehicles.mavlink.link import Received
+from app.vehicles.mavlink.altitude_sources import SILENT_S, AltitudeSource, Pose
 from app.vehicles.mocap.addresses import NatNetAddress
 
 ANSWERED_WITHIN_S: Final = 1.0
@@ -57,14 +56,13 @@ class _Client(Protocol):
     def shutdown(self) -> None: ...
 
 
-class NatNetSource(PoseStream):
+class NatNetSource(AltitudeSource):
     """Source of altitude received over NatNet, in its own thread, which polls for packets every 4 ms."""
 
     def __init__(self, address: NatNetAddress, clock: Clock) -> None:
         """Connect to the server and wait for the body. Raises VehicleError if the server does not answer, no frames
         arrive, or the body is not among those streamed."""
-        super().__init__()
-        self.name: Final = f"rigid body {address.body} of the motion capture at {address.host}"
+        super().__init__(f"rigid body {address.body} of the motion capture at {address.host}")
         self._address, self._clock = address, clock
         self._streamed_bodies: set[int] = set()
         self._frame_s: float | None = None
@@ -87,18 +85,14 @@ class NatNetSource(PoseStream):
         newest = self.newest
         return f"The cameras do not see {self.name}." if newest is not None and not newest.tracking_valid else ""
 
-    def on_message(self, received: Received) -> None:
-        """Ignore messages of the vehicle's link."""
-
     def close(self) -> None:
         self._closing.set()
         self._thread.join()
         self._client.shutdown()
 
     def _connect(self) -> _Client:
-        host = self._address.host
         try:
-            server = socket.gethostbyname(host)
+            server = socket.gethostbyname(self._address.host)
             local = self._address.local or _interface_towards(server, self._address.command_port)
         except OSError as error:
             raise _unreachable(self._address, f"there is no route to it: {error.strerror or error}") from error
@@ -165,13 +159,9 @@ class NatNetSource(PoseStream):
         for body in frame.rigid_bodies:
             self._streamed_bodies.add(body.id_num)
             if body.id_num == self._address.body:
-                self.put(
-                    body.pos[_UP[self._address.up]],
-                    (*body.pos, *body.rot),
-                    time_s=frame.suffix.timestamp,
-                    arrived_s=self._clock.now_s(),
-                    tracking_valid=bool(body.tracking_valid),
-                )
+                up_m, values = body.pos[_UP[self._address.up]], (*body.pos, *body.rot)
+                pose = Pose(frame.suffix.timestamp, up_m, values, tracking_valid=bool(body.tracking_valid))
+                self.put(pose, self._clock.now_s())
 
 
 def _interface_towards(server: str, port: int) -> str:

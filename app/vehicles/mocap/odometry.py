@@ -3,14 +3,13 @@
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.dialects import COMMON, Message, is_known, number
 from app.core.clock import Clock
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.altitude_sources import SILENT_S, PoseStream
+from app.vehicles.mavlink.altitude_sources import SILENT_S, AltitudeSource, Pose
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import Peer, open_transport
 from app.vehicles.mocap.addresses import StreamAddress
@@ -23,17 +22,6 @@ _COMPONENT: Final = 190
 _READ_S: Final = 0.1
 _LOST: Final = -1.0
 """ODOMETRY's quality when odometry has failed; 0: not reported."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """Pose at a time of the sender's clock; altitude is positive up from the sender's zero; `values` are all components
-    in the message."""
-
-    time_s: float
-    altitude_m: float
-    values: tuple[float, ...]
-    tracking_valid: bool
 
 
 def _odometry(message: Message) -> Pose:
@@ -54,13 +42,12 @@ READERS: Final[Mapping[str, Callable[[Message], Pose]]] = MappingProxyType(
 )
 
 
-class OdometrySource(PoseStream):
+class OdometrySource(AltitudeSource):
     """Odometry among the messages passed to `on_message`. Only the message type that arrives first is used, because
     two alternating estimates would not be one stream."""
 
     def __init__(self, name: str, clock: Clock) -> None:
-        super().__init__()
-        self.name: Final = name
+        super().__init__(name)
         self._clock = clock
         self._kind = ""
         self._received_s = clock.now_s()
@@ -78,17 +65,7 @@ class OdometrySource(PoseStream):
         if kind not in READERS or kind != (self._kind or kind):
             return
         self._kind, self._received_s = kind, arrived_s
-        pose = READERS[kind](message)
-        self.put(
-            pose.altitude_m,
-            pose.values,
-            time_s=pose.time_s,
-            arrived_s=arrived_s,
-            tracking_valid=pose.tracking_valid,
-        )
-
-    def close(self) -> None:
-        """Do nothing: the link belongs to the vehicle."""
+        self.put(READERS[kind](message), arrived_s)
 
 
 class StreamSource(OdometrySource):

@@ -1,4 +1,4 @@
-"""Detection of two vehicles that use the same system id.
+"""What is found out from the packets of a link: its statistics, and whether two vehicles use the same system id.
 
 Two vehicles that send at the same time use every sequence number twice, with different contents, each going on where
 it was, and report two times. Packets that are repeated, late or out of order do neither; a vehicle that restarts uses
@@ -15,6 +15,8 @@ from typing import Final
 from app.vehicles.mavlink.transports import Peer
 
 NUMBERS: Final = 256
+MAX_SEQUENCE_LEAD: Final = 128
+"""A sequence number further ahead than this is an old one, because packets may overtake each other."""
 WITHIN_S: Final = 2.0
 PIECES: Final = 6
 """Pieces of evidence within `WITHIN_S` that make a duplicate certain."""
@@ -54,6 +56,46 @@ _PEERS_LOST: Final = 64
 """The numbers of a vehicle's packets go on at another port if fewer than this are missing."""
 _PEERS_REMEMBERED_S: Final = 3.0
 """Time for which such evidence counts."""
+
+
+@dataclass(slots=True)
+class LinkHealth:
+    """Statistics of a link; times in seconds of the link's clock."""
+
+    received: int = 0
+    """Messages of the vehicle that the dialect knows."""
+    lost: int = 0
+    """Messages missing by the vehicle's sequence numbers."""
+    bad: int = 0
+    """Sections of bad data: wrong checksums, wrong signatures."""
+    foreign: int = 0
+    """Datagrams of other senders and messages of other systems, all dropped."""
+    overrun: int = 0
+    """Messages dropped because `receive` was not called."""
+    sent: int = 0
+    unsent: int = 0
+    """Messages that could not be sent: no peer yet, no connection, full buffer."""
+    last_packet_s: float | None = None
+    last_heartbeat_s: float | None = None
+
+
+class LossCounter:
+    """Counts missing messages by the sequence numbers of each component."""
+
+    def __init__(self, uncounted: tuple[str, ...]) -> None:
+        """`uncounted` are the prefixes of the names of messages with a separate sequence counter."""
+        self._uncounted = uncounted
+        self._latest: dict[int, int] = {}
+        self.lost = 0
+
+    def count(self, kind: str, component: int, number: int) -> None:
+        """Count a message by its sequence number, 0 to 255; late and repeated messages are ignored."""
+        if kind.startswith(self._uncounted):
+            return
+        ahead = (number - self._latest.get(component, number - 1)) % NUMBERS
+        if 0 < ahead < MAX_SEQUENCE_LEAD:
+            self.lost += ahead - 1
+            self._latest[component] = number
 
 
 @dataclass(slots=True)
