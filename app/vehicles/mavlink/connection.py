@@ -37,9 +37,9 @@ class VehicleConnection(ObservedVehicle):
     def _open(self, *, observes: bool) -> None:
         self._parameters = self._trial_parameters()
         self._connect()
-        if not observes and self._quarantine.is_active:
-            raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
         if not observes:
+            if self._quarantine.is_active:
+                raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
             preflight.require(self.check())
 
     def _connect(self) -> None:

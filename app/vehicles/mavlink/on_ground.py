@@ -17,14 +17,14 @@ from app.vehicles.mavlink.sent_commands import set_up
 
 WATCHED_S: Final = 2.0
 STANDS_WITHIN_M: Final = 0.3
+ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
+LAND_FIRST: Final = "Land it, check that its motors have stopped, then verify its gains and release it."
+ONE_VEHICLE: Final = "Switch the other vehicle off, or give each its own id."
 _RATE_OVER_S: Final = 10.0
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
 _IRREGULAR: Final = 0.25
 """Some autopilots send at intervals that differ by half: a position is lost from 1.75 intervals on."""
-ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
-LAND_FIRST: Final = "Land it, check that its motors have stopped, then verify its gains and release it."
-ONE_VEHICLE: Final = "Switch the other vehicle off, or give each its own id."
 _REFERENCE_WITHIN_S: Final = 13.0
 """Time from a position on within which a flight plan sets its ground reference; 10 s in the stock plans."""
 

@@ -12,7 +12,6 @@ from app.vehicles.mavlink.events import ActionDone, ActionRefused, PacketReceive
 from app.vehicles.mavlink.failures import DESCENDING_M_S, NOT_DESCENDING, NOT_DESCENDING_AFTER_S, REPEAT_S, land_every_s
 from app.vehicles.mavlink.radio import JUST_HEARD_S, AutopilotLink
 
-_SAME_TARGET_M: Final = 0.01
 STOPPING_S: Final = 5.0
 """Time for which the command to stop the motors is repeated; later, a pilot may be flying the vehicle."""
 SINKING_S: Final = 1.0
@@ -21,6 +20,7 @@ LANDED_WITHIN_S: Final = 20.0
 """Longer than a landing takes: a flight after a landing of this length was begun by somebody else."""
 UNHEARD_S: Final = 60.0
 """Time for which a command is repeated to a vehicle of which nothing is received, after the worker's end."""
+_SAME_TARGET_M: Final = 0.01
 
 _Flown = Literal["by a pilot", "as in a trial", "otherwise"]
 """How a vehicle is flown, by its mode and block. A pilot flies it in every mode that is not known to be automatic."""
