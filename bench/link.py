@@ -22,7 +22,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -161,7 +161,7 @@ def latencies_s(rate_hz: float, seconds: float, *, is_computing: bool) -> tuple[
     sent_ns: list[int] = []
     with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "flight.tlog"
-        with Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log) as link:
+        with closing(Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log)) as link:
             drone.begin()
             with audience(link, is_computing=is_computing):
                 until_s = time.monotonic() + seconds
@@ -185,7 +185,7 @@ def recording_share(rate_hz: float, seconds: float) -> tuple[float, int, int]:
     recorded: list[Message] = []
     with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "flight.tlog"
-        with Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log) as link:
+        with closing(Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log)) as link:
             drone.begin()
             start_s, used_s = time.monotonic(), time.process_time()
             while time.monotonic() - start_s < seconds:

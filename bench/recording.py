@@ -32,7 +32,7 @@ from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.ground_observation import GroundObservation
+from app.vehicles.mavlink.on_ground import GroundObservation
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialRunner
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -159,7 +159,8 @@ def free_port() -> int:
 
 def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[FlightRecord, Counter[int]]:
     """Fly a whole trial and return its record, with the count of each time stamp in it."""
-    vehicle = LongRecord(options, GAINS[autopilot], is_real=False)
+    clock = ScaledClock(float(options["clock_speed"]))
+    vehicle = LongRecord(options, GAINS[autopilot], is_real=False, clock=clock)
     try:
         vehicle.stage(GAINS[autopilot])
         order = FlightOptions(seed=1, window_s=meter.until_s - RECORDED_BEYOND_S)

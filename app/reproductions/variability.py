@@ -20,7 +20,7 @@ from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.results import OVERRULE, Progress, Result, Row, marks, ratio
 from app.reproductions.tables import overruled_for
 from app.vehicles.registry import check_options
-from app.vehicles.simulated import simulate_takeoff, trajectory_of
+from app.vehicles.simulated import simulate_flight, trajectory_of
 from app.vehicles.twin import TwinFlight
 
 GROUPS: Final = 200
@@ -108,7 +108,7 @@ def repeated_errors(gains: tuple[int, int, int], *, seed: int, group: int, fade:
         flown = TwinFlight(
             {**options, "hover_throttle": hover / weaker}, flight_seed(seed, group * REPEATS + flight + 1)
         )
-        errors[flight] = get_experiment("takeoff").error(trajectory_of(simulate_takeoff(flown, _named(gains)), "twin"))
+        errors[flight] = get_experiment("takeoff").error(trajectory_of(simulate_flight(flown, _named(gains)), "twin"))
     return errors
 
 

@@ -104,23 +104,16 @@ def _send_samples(
     for i, row in enumerate(detail):
         if (stop := pacer.wait_until(i * STEP_S, should_stop)) is not None:
             return i, stop
-        on_sample(_sample(i, row))
+        values: list[float] = row.tolist()
+        watched = {name: values[column] * unit for name, (column, unit) in DETAIL_CHANNELS.items()}
+        on_sample(Sample(i * STEP_S, {OUTPUT: values[REFERENCE] - values[PITCH]} | watched))
     return len(detail), None
-
-
-def _channels(detail: Samples) -> dict[str, Samples]:
-    return named_channels(detail[:, REFERENCE] - detail[:, PITCH], detail)
 
 
 def _trajectory(detail: Samples) -> Trajectory:
     time_s = np.arange(len(detail), dtype=np.float64) * STEP_S
-    return Trajectory(time_s, _channels(detail), "lti", "simulation")
-
-
-def _sample(step: int, row: Samples) -> Sample:
-    values: list[float] = row.tolist()
-    watched = {name: values[column] * unit for name, (column, unit) in DETAIL_CHANNELS.items()}
-    return Sample(step * STEP_S, {OUTPUT: values[REFERENCE] - values[PITCH]} | watched)
+    channels = named_channels(detail[:, REFERENCE] - detail[:, PITCH], detail)
+    return Trajectory(time_s, channels, "lti", "simulation")
 
 
 def _numbers(gains: Gains) -> dict[str, float]:

@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 MASS_KG: Final = 0.4
 FULL_THRUST_N: Final = 4 * 0.35 * 4.4482216
 
-_ROOT: Final = Path(__file__).parent
-_AIRCRAFT: Final = "ardrone2"
-_LATITUDE_DEG: Final = 52.0
 _FOOT_M: Final = 0.3048
 _POUND_KG: Final = 0.45359237
 _CENTRE_ABOVE_GROUND_M: Final = 0.1 - 0.00196
@@ -54,12 +51,12 @@ def new_aircraft() -> "jsbsim.FGFDMExec":
     import jsbsim
 
     jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # JSBSim's own gap in its types
-    fdm = jsbsim.FGFDMExec(str(_ROOT))
+    fdm = jsbsim.FGFDMExec(str(Path(__file__).parent))
     fdm.set_aircraft_path("aircraft")
-    if not fdm.load_model(_AIRCRAFT):
+    if not fdm.load_model("ardrone2"):
         raise VehicleError("JSBSim could not load the simulated vehicle.", hint="Reinstall Gainline.")
     fdm.set_dt(STEP_S)
-    fdm["ic/lat-geod-deg"] = _LATITUDE_DEG
+    fdm["ic/lat-geod-deg"] = 52.0
     fdm["ic/h-agl-ft"] = _CENTRE_ABOVE_GROUND_M / _FOOT_M
     if not fdm.run_ic():
         raise VehicleError("JSBSim could not place the vehicle on the ground.", hint="Reinstall Gainline.")

@@ -105,13 +105,10 @@ def _accept(option: Option, value: object) -> tuple[OptionValue, str | None]:
     """Return `value` in the type of the option's default, and the reason if it is invalid."""
     default = option.default
     if isinstance(default, bool | str):
+        expected = "must be true or false" if isinstance(default, bool) else "must be text"
         fits = isinstance(value, type(default))
-        return (value, None) if isinstance(value, bool | str) and fits else (default, _expected(default))
+        return (value, None) if isinstance(value, bool | str) and fits else (default, expected)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return default, f"must be a number, got {value!r}"
     reason = option.refusal(value)
     return (float(value), None) if reason is None else (default, reason)
-
-
-def _expected(default: bool | str) -> str:
-    return "must be true or false" if isinstance(default, bool) else "must be text"

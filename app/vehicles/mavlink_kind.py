@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from app.autopilots.autopilot import Autopilot, check_gains
 from app.autopilots.registry import AUTOPILOTS
-from app.core.clock import ScaledClock
+from app.core.clock import Clock, ScaledClock
 from app.core.definition import Option
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
@@ -19,6 +19,7 @@ from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mocap import addresses as sources
 
 if TYPE_CHECKING:
+    from app.vehicles.mavlink.altitude_sources import AltitudeSource
     from app.vehicles.mavlink.vehicle import MavlinkVehicle
 
 SCORED: Final = ("vehicle", "mocap")
@@ -68,7 +69,6 @@ def _open(
     The modules that talk to a vehicle are imported here, so that only the process that opens one loads them.
     """
     from app.vehicles.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415
-    from app.vehicles.mocap.opening import open_source  # noqa: PLC0415
 
     clock = ScaledClock(float(options["clock_speed"]))
     place = str(options["second_source"])
@@ -91,6 +91,21 @@ def _open(
         if source is not None:
             source.close()
         raise
+
+
+def open_source(place: str, clock: Clock) -> "AltitudeSource":
+    """Open the second source of altitude at this address. Raises InputError for an invalid address, VehicleError if
+    nothing is received there; odometry on the vehicle's own link is not waited for."""
+    from app.vehicles.mocap.natnet import NatNetSource  # noqa: PLC0415
+    from app.vehicles.mocap.odometry import OdometrySource, StreamSource  # noqa: PLC0415
+
+    match sources.parse(place):
+        case sources.NatNetAddress() as address:
+            return NatNetSource(address, clock)
+        case sources.OdometryAddress():
+            return OdometrySource("odometry on the vehicle's own link", clock)
+        case sources.StreamAddress() as address:
+            return StreamSource(address, clock)
 
 
 def _longest_window_s(options: Options) -> float:

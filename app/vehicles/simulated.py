@@ -86,18 +86,15 @@ class Pacer:
         `should_stop` is called at least once, every 20 ms of the clock, and a last time at the end of the wait.
         """
         while True:
-            early_s = self._early_s(vehicle_time_s)
+            early_s = 0.0
+            if self._speed is not None:
+                early_s = self._start_s + vehicle_time_s / self._speed - self._clock.now_s()
             if early_s > 0.0:
                 self._clock.wait_s(min(early_s, LISTEN_EVERY_S))
             if (stop := should_stop()) is not None:
                 return stop
             if early_s <= LISTEN_EVERY_S:
                 return None
-
-    def _early_s(self, vehicle_time_s: float) -> float:
-        if self._speed is None:
-            return 0.0
-        return self._start_s + vehicle_time_s / self._speed - self._clock.now_s()
 
 
 GAIN_NAMES: Final = ("kp", "ki", "kd")
@@ -270,17 +267,15 @@ def opener(
     return open_vehicle
 
 
-def simulate_takeoff(simulation: Simulation, gains: Gains) -> Rows:
-    """Simulate one takeoff in one call, with the same result as through the vehicle interface; shape (`STEPS`, 8).
+def simulate_flight(
+    simulation: Simulation, gains: Gains, set_points: SetPoints = SET_POINTS, steps: int = STEPS
+) -> Rows:
+    """Simulate one flight, by default a takeoff, in one call per set point, with the same result as through the vehicle
+    interface; shape (`steps`, 8).
 
-    For the twin this takes 1.5 ms instead of 30. Gains are 32-bit integers and are not checked. A flight that diverges
-    numerically has non-finite altitudes.
+    For the twin a takeoff takes 1.5 ms instead of 30. Gains are 32-bit integers and are not checked. A flight that
+    diverges numerically has non-finite altitudes.
     """
-    return simulate_flight(simulation, gains, SET_POINTS, STEPS)
-
-
-def simulate_flight(simulation: Simulation, gains: Gains, set_points: SetPoints, steps: int) -> Rows:
-    """The same with other set points, for so many steps; shape (`steps`, 8)."""
     rows = []
     edges = [*set_points.steps, steps]
     for first, last, altitude_m in zip(edges, edges[1:], set_points.altitudes_m, strict=False):

@@ -8,7 +8,7 @@ from app.autopilots.registry import get_experiment
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.flight_end import Failure
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.mocap.opening import open_source
+from app.vehicles.mavlink_kind import open_source
 from bench.hazards.cases import Case
 from bench.hazards.rig import InjectedFault, MotorStop, Overridden, Rig
 from bench.hazards.trial_states import TrialStates

@@ -13,7 +13,7 @@ from app.simdrone.drone import BOOT_S
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.mocap.opening import open_source
+from app.vehicles.mavlink_kind import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, PlannedFault, tuned_gains
 from bench.hazards.fault_trial import outcome_of
 from bench.hazards.hostile_checks import LOST, GroundTruth, ReportedOutcome, TrueState, find_violations

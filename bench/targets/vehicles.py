@@ -19,7 +19,7 @@ from app.vehicles.base import OptionValue
 from app.vehicles.jsbsim import FULL_THRUST_N, JsbsimFlight
 from app.vehicles.kernels import ALTITUDE, Rows
 from app.vehicles.registry import check_options
-from app.vehicles.simulated import Simulation, simulate_takeoff, trajectory_of
+from app.vehicles.simulated import Simulation, simulate_flight, trajectory_of
 from app.vehicles.twin import TwinFlight
 
 HIGHEST_M: Final = 3.75
@@ -232,4 +232,4 @@ def _polish(error: Callable[[Vector], float], start: Vector, coarsest: float, fi
 
 def _rows(vehicle: SampledVehicle, gains: Gains, seed: int) -> Rows:
     simulation = _SIMULATIONS[vehicle.kind]({name: float(value) for name, value in vehicle.options.items()}, seed)
-    return simulate_takeoff(simulation, gains)
+    return simulate_flight(simulation, gains)

@@ -1,5 +1,6 @@
 """Signed links: MAVLink 2 with a key that both ends hold."""
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,7 @@ def telemetry(vehicle: Codec, time_boot_ms: int) -> bytearray:
 def test_a_signed_link_carries_commands_and_telemetry() -> None:
     with (
         FakeVehicleEndpoint(ARDUPILOTMEGA, system=1, key=KEY) as vehicle,
-        Link(vehicle.address, ARDUPILOTMEGA, clock=CLOCK, target_system=1, signing_key=KEY) as link,
+        closing(Link(vehicle.address, ARDUPILOTMEGA, clock=CLOCK, target_system=1, signing_key=KEY)) as link,
     ):
         vehicle.say("LOCAL_POSITION_NED", **position(20))
         assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [20]
@@ -62,7 +63,7 @@ def test_a_signed_link_carries_commands_and_telemetry() -> None:
 def test_what_is_not_signed_with_the_key_is_noise(key: bytes | None) -> None:
     with (
         FakeVehicleEndpoint(ARDUPILOTMEGA, system=1, key=key) as vehicle,
-        Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1, signing_key=KEY) as link,
+        closing(Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1, signing_key=KEY)) as link,
     ):
         vehicle.say("LOCAL_POSITION_NED", **position(20))
         eventually(lambda: link.health.foreign == 1)  # nor does it make itself the vehicle

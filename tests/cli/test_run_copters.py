@@ -69,7 +69,7 @@ def drone(autopilot: str) -> Iterator[str]:
 def held_by(address: str, profile: str, names: Mapping[str, float]) -> dict[str, float]:
     """What the vehicle says it holds, asked as any ground station asks."""
     found: dict[str, float] = {}
-    with Link(parse(address), AUTOPILOTS[profile].dialect, clock=ScaledClock(1.0)) as link:
+    with closing(Link(parse(address), AUTOPILOTS[profile].dialect, clock=ScaledClock(1.0))) as link:
 
         def ask() -> None:
             for name in names.keys() - found.keys():

@@ -16,7 +16,7 @@ from app.autopilots.registry import get_experiment
 from app.campaigns.schemas import Definition, Sort
 from app.common.states import CampaignState, JobState, Outcome, TrialState, VehicleState
 from app.core.records.trajectory import CHANNEL_UNITS
-from app.vehicles.simulated import simulate_takeoff, trajectory_of
+from app.vehicles.simulated import simulate_flight, trajectory_of
 from app.vehicles.twin import TWIN, TwinFlight
 from app.web.errors import _KINDS
 from tests.runtime.processes import Serving, environment
@@ -59,7 +59,7 @@ def test_the_twins_optimum_is_the_lowest_error_of_its_bounded_gains_without_scat
 
     def flown(counts: NDArray[np.float64]) -> float:
         gains = dict(zip(takeoff.space.names, counts.tolist(), strict=True))
-        rows = simulate_takeoff(TwinFlight({**options, "scatter": 0.0}, 0), gains)
+        rows = simulate_flight(TwinFlight({**options, "scatter": 0.0}, 0), gains)
         return takeoff.error(trajectory_of(rows, "twin"))
 
     found = differential_evolution(

@@ -83,9 +83,7 @@ def parse(text: str) -> Address:
 
 def is_loopback(address: Address) -> bool:
     """Whether the address is on this computer, and so of a simulation, not a vehicle."""
-    if isinstance(address, SerialAddress):
-        return False
-    return is_loopback_host(address.host)
+    return not isinstance(address, SerialAddress) and is_loopback_host(address.host)
 
 
 def is_loopback_host(host: str) -> bool:

@@ -6,12 +6,12 @@ from typing import Final
 from app.autopilots.commands import Action
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, SafeGainsError, VehicleError
-from app.vehicles.mavlink import addresses, ground_observation, preflight, preparation
+from app.vehicles.mavlink import addresses, on_ground, preflight
 from app.vehicles.mavlink.failures import HELP
-from app.vehicles.mavlink.ground_observation import WATCHED_S, GroundObservation
-from app.vehicles.mavlink.observed_vehicle import LISTEN_S, ObservedVehicle
+from app.vehicles.mavlink.observed_vehicle import ObservedVehicle
 from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
-from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.radio import LISTEN_S
+from app.vehicles.mavlink.sent_commands import RepeatedCommand
 from app.vehicles.mavlink.trial_state import State
 
 _FURTHER_OBSERVATIONS: Final = 3
@@ -38,7 +38,9 @@ class VehicleConnection(ObservedVehicle):
         self._parameters = self._trial_parameters()
         self._connect()
         if not observes:
-            self._require_ready()
+            if self._quarantine.is_active:
+                raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
+            preflight.require(self.check())
 
     def _connect(self) -> None:
         self._identity.await_vehicle(str(self._options["address"]))
@@ -47,9 +49,7 @@ class VehicleConnection(ObservedVehicle):
         self._listen(0.0)
         if self._was_flying:
             self._take_up_landing()
-        if self._quarantine.is_active:
-            return
-        if self._has_set_safe_gains():
+        if not self._quarantine.is_active and self._has_set_safe_gains():
             self._quarantine.enter(State.SET_GAINS)
             self._quarantine.enter(State.IDLE)
             self._quarantine.requested, self._repeated, self._was_flying = "", None, False
@@ -72,12 +72,6 @@ class VehicleConnection(ObservedVehicle):
             self._radio, lambda: files_for(folder, address, self.identity, is_simulated=is_simulated)
         )
 
-    def _require_ready(self) -> None:
-        """Raise SafeGainsError while it may only be observed, VehicleError if it is not ready to fly."""
-        if self._quarantine.is_active:
-            raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
-        preflight.require(self.check())
-
     # ---- safe gains
 
     def restore(self) -> dict[str, float]:
@@ -85,7 +79,7 @@ class VehicleConnection(ObservedVehicle):
         so. Raises SafeGainsError if it is armed, is another one, or does not accept them; VehicleError if it does not
         report its known hardware id."""
         self._identify()
-        preparation.require_disarmed(self._radio)
+        on_ground.require_disarmed(self._radio)
         if self._identity.is_another:
             raise SafeGainsError(self.concern, hint=_ANOTHER)
         self._identity.require_uid()
@@ -142,7 +136,7 @@ class VehicleConnection(ObservedVehicle):
     def _set_up(self) -> None:
         """Set up telemetry and safe gains. Raises VehicleError if the vehicle is armed, refuses, does not accept its
         safe gains, or holds others that no person has decided to overwrite."""
-        preparation.require_disarmed(self._radio)
+        on_ground.require_disarmed(self._radio)
         self._request_telemetry()
         if self._decided:
             self.restore()
@@ -160,23 +154,23 @@ class VehicleConnection(ObservedVehicle):
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
         error. Raises LinkError if the link is closed."""
-        return self._check(WATCHED_S)[1]
+        return self._check(on_ground.WATCHED_S)[1]
 
-    def _check(self, watched_s: float) -> tuple[GroundObservation, tuple[CheckItem, ...]]:
+    def _check(self, watched_s: float) -> tuple[on_ground.GroundObservation, tuple[CheckItem, ...]]:
         radio, options = self._radio, self._options
         self._identify()
         if not radio.reports_armed and not self._quarantine.is_active:
             self._request_telemetry()
-            preparation.make_armable(radio)
+            on_ground.make_armable(radio)
         watched = self._observe_standing(watched_s)
         for _ in range(_FURTHER_OBSERVATIONS):
             if self._quarantine.is_active or not (
-                preparation.make_armable(radio) or preparation.set_ground_reference(radio, watched)
+                on_ground.make_armable(radio) or on_ground.set_ground_reference(radio, watched)
             ):
                 break
             watched = self._observe_standing(watched_s)
         if not self._quarantine.is_active:
-            preparation.confirm_stop(radio, watched)
+            on_ground.confirm_stop(radio, watched)
         minimum_v, pinned = float(options["min_battery_v"]), self._identity.pinned
         items = preflight.evaluate_items(radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if pinned is not None and pinned.uid:
@@ -189,8 +183,8 @@ class VehicleConnection(ObservedVehicle):
         items = (*items, self._gains.check())
         return watched.continued(radio), items
 
-    def _observe_standing(self, watched_s: float) -> GroundObservation:
-        watched = ground_observation.observe(self._radio, self._secondary, watched_s=watched_s)
+    def _observe_standing(self, watched_s: float) -> on_ground.GroundObservation:
+        watched = on_ground.observe(self._radio, self._secondary, watched_s=watched_s)
         self._identify()
         return watched
 

@@ -11,10 +11,8 @@ from app.vehicles.base import Identity, VehicleError
 from app.vehicles.end_texts import FAILURE_TEXTS
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.radio import HEARTBEAT_WITHIN_S, LISTEN_S, AutopilotLink
 
-_HEARTBEAT_S: Final = 5.0
-_LISTEN_S: Final = 0.1
 _AUTOPILOT: Final = 1
 """Usual component of an autopilot (MAV_COMP_ID_AUTOPILOT1): another one may pose as it."""
 _VERSION_ATTEMPTS: Final = 2
@@ -34,10 +32,9 @@ class VehicleIdentity:
     def reported(self) -> Identity:
         """Identity as reported, which may take some time; parts not reported are those of the pinned identity."""
         radio, seen = self._radio, self._radio.seen
-        identity = Identity(
+        return Identity(
             system_id=radio.target.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid
-        )
-        return identity.completed_by(self.pinned)
+        ).completed_by(self.pinned)
 
     @property
     def change(self) -> str:
@@ -80,7 +77,8 @@ class VehicleIdentity:
         reply, and Paparazzi sends them unrequested; if the pinned vehicle has a hardware id, it is requested for 5
         s."""
         radio = self._radio
-        radio.receive_pending()
+        radio.listen(0.0)
+        radio.forget_absent(radio.clock.now_s())
         is_needed = bool(self.missing_uid)
         if radio.profile.reports_version and (is_needed or not (radio.seen.version or radio.seen.uid)):
             attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS
@@ -90,11 +88,11 @@ class VehicleIdentity:
     def await_vehicle(self, address: str) -> None:
         """Wait for a heartbeat of the right autopilot, sending nothing. Raises VehicleError if none arrives within 5 s
         (longer if the vehicle's clock is fast), or if it is of another vehicle than the pinned one."""
-        radio, within_s = self._radio, _HEARTBEAT_S * self._radio.timeout_factor
+        radio, within_s = self._radio, HEARTBEAT_WITHIN_S * self._radio.timeout_factor
         until_s = radio.clock.now_s() + within_s
         other: Heartbeat | None = None
         while radio.clock.now_s() < until_s:
-            heard = [each.measurement for each in radio.listen(_LISTEN_S) if isinstance(each.measurement, Heartbeat)]
+            heard = [each.measurement for each in radio.listen(LISTEN_S) if isinstance(each.measurement, Heartbeat)]
             for heartbeat in (each for each in heard if each.autopilot == radio.profile.autopilot):
                 if heartbeat.component == _AUTOPILOT:
                     return self._set_target(heartbeat)

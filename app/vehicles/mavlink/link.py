@@ -11,8 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 from app.autopilots.dialects import (
     BAD_DATA,
@@ -31,9 +30,7 @@ from app.autopilots.dialects import (
 )
 from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
-from app.vehicles.mavlink.link_health import LinkHealth, LossCounter
-from app.vehicles.mavlink.other_peers import GONE_AFTER_S, OtherPeers
+from app.vehicles.mavlink.reception import GONE_AFTER_S, DuplicateDetector, LinkHealth, LossCounter
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
@@ -45,8 +42,6 @@ MAX_QUEUED_MESSAGES: Final = 20_000
 """Maximum number of messages that wait for `receive`; beyond it the oldest are dropped, and counted."""
 STEP_S: Final = 1.0 / 256.0
 """Step of the clock between two reads of a transport without a thread."""
-DUPLICATE_TIMEOUT_S: Final = 3.0
-"""Time for which messages of another peer with the vehicle's ids count."""
 
 _TOLD_ONCE: Final = frozenset({"PARAM_VALUE", "COMMAND_ACK", "MISSION_ACK", "SCRIPT_CURRENT"})
 """Messages of something that has happened: a copy of one that arrives later is out of date."""
@@ -104,9 +99,6 @@ class Link:
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
         self._duplicates = DuplicateDetector()
-        self._others = OtherPeers()
-        self._last_number = 0
-        self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
         self._plan: dict[float, bytes] = {}
@@ -123,21 +115,11 @@ class Link:
             self._thread = threading.Thread(target=self._run, name=f"link {address}", daemon=True)
             self._thread.start()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     @property
     def duplicate_reason(self) -> str:
         """Evidence that two vehicles use the system id; empty without evidence."""
         now_s = self._clock.now_s()
         with self._inbox_changed:
-            if now_s - self._duplicate_s < DUPLICATE_TIMEOUT_S:
-                return "Another vehicle with the same system id sends from another address."
             return self._duplicates.reason(now_s)
 
     @property
@@ -228,7 +210,7 @@ class Link:
     def _run(self) -> None:
         try:
             while not self._is_closing:
-                self._attend(self._patience_s())
+                self._attend(self._clock.wall_s(max(self._next_heartbeat_s - self._clock.now_s(), 0.0)))
         except Exception as error:
             self._failure = error
             raise
@@ -246,10 +228,6 @@ class Link:
             self._is_closed = True
             self._transport.close()
             self._inbox_changed.notify_all()
-
-    def _patience_s(self) -> float:
-        """Return the time to wait for packets, s of wall time."""
-        return self._clock.wall_s(max(self._next_heartbeat_s - self._clock.now_s(), 0.0))
 
     def _send_heartbeat(self) -> None:
         now_s = self._clock.now_s()
@@ -298,16 +276,12 @@ class Link:
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
                 self._transport.adopt(peer)
-        elif not is_gone and self._health.last_packet_s is not None and self._others.may_check(peer, now_s):
+        elif not is_gone and self._health.last_packet_s is not None and self._duplicates.may_check(peer, now_s):
             message = next((each for each in self._new_codec().parse(data) if self._poses_as_vehicle(each)), None)
-            if message is None:
-                return
-            verdict = self._others.add(
-                peer, sequence(message), now_s, last_number=self._last_number, last_s=self._health.last_packet_s
+            has_moved = message is not None and self._duplicates.add_other(
+                peer, sequence(message), now_s, last_s=self._health.last_packet_s
             )
-            if verdict == "duplicate":
-                self._duplicate_s = now_s
-            elif verdict == "moved" and is_same_host:
+            if has_moved and is_same_host:
                 self._transport.adopt(peer)
 
     def _poses_as_vehicle(self, message: Message) -> bool:
@@ -326,9 +300,8 @@ class Link:
         if self._make not in (None, make):
             self._other_makes.add(make)
             return False
-        system, component = self._vehicle_system, self._vehicle_component
-        is_it = system is None or source_system(message) == system
-        return is_it and (component is None or source_component(message) == component)
+        is_its_system = self._vehicle_system in (None, source_system(message))
+        return is_its_system and self._vehicle_component in (None, source_component(message))
 
     def _queue(self, messages: list[Message]) -> None:
         now_s = self._clock.now_s()
@@ -365,7 +338,6 @@ class Link:
         if self._vehicle_component in (None, source_component(message)):
             self._health.last_packet_s = now_s
             counts = not message.get_type().startswith(self._dialect.uncounted)
-            self._last_number = sequence(message) if counts else self._last_number
             is_copy = self._duplicates.add(frame, sequence(message), now_s, _boot_s(message), is_counted=counts)
             if is_copy and message.get_type() in _TOLD_ONCE:
                 return False

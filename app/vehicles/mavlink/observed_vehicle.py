@@ -12,21 +12,18 @@ from app.core.policy import Gains
 from app.vehicles.base import Identity, VehicleError
 from app.vehicles.end_texts import requested
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import parameters, preparation
-from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
+from app.vehicles.mavlink import parameters
+from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
-from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
-from app.vehicles.mavlink.opening import open_radio
-from app.vehicles.mavlink.parameters import GainStore
-from app.vehicles.mavlink.quarantine import Quarantine
-from app.vehicles.mavlink.repeated_command import STOPPING_S, RepeatedCommand
-from app.vehicles.mavlink.status_reader import StatusReader
+from app.vehicles.mavlink.on_ground import ARMED
+from app.vehicles.mavlink.radio import LISTEN_S, open_radio
+from app.vehicles.mavlink.sent_commands import STOPPING_S, RepeatedCommand, set_up
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial_state import State
+from app.vehicles.mavlink.vehicle_status import Quarantine, StatusReader
 
-LISTEN_S: Final = 0.1
 _POSITIONS_CEASED_S: Final = 2.0
 _NOT_STOPPED: Final = f"The vehicle has not confirmed within {STOPPING_S:g} s that its motors stopped."
 _DROPPED: Final = "The vehicle was not known to be on the ground: inspect it before it flies again."
@@ -41,7 +38,7 @@ class ObservedVehicle(ABC):
         safe_gains: Gains,
         *,
         is_real: bool,
-        clock: Clock | None = None,
+        clock: Clock,
         identity: Identity | None = None,
         observes: bool = False,
         decided: bool = True,
@@ -58,7 +55,7 @@ class ObservedVehicle(ABC):
         A vehicle that `was_flying` in a trial when the process that flew it ended gets Land while it is flown as in a
         trial, and no heartbeats of a ground station until then.
 
-        `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
+        `clock` is the vehicle's time; `source` is a second source of altitude, which is
         closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
         `trial_parameters` keeps the parameters that a trial changes in addition to the gains, so that the next
         connection can restore them if this process dies. `on_wait` is called while waiting for the vehicle on the
@@ -76,15 +73,21 @@ class ObservedVehicle(ABC):
         self._is_restoring = False
         self.has_stopped: bool | None = False
         self._was_flying = was_flying
-        self._secondary = None if source is None else AlignedAltitudeSource(source)
-        hear, wait, silent = None if source is None else source.on_message, self._while_waiting, self._is_silent
+        self._secondary = source
         self._on_wait = on_wait
-        self._radio = open_radio(options, clock, on_message=hear, on_wait=wait, is_silent=silent, transport=transport)
+        self._radio = open_radio(
+            options,
+            clock,
+            on_message=None if source is None else source.on_message,
+            on_wait=self._while_waiting,
+            is_silent=self._is_silent,
+            transport=transport,
+        )
         self._identity = VehicleIdentity(self._radio, identity)
         self._status_reader = StatusReader(self._radio)
         self._telemetry_requested_s = self._radio.clock.now_s()
         try:
-            self._gains = GainStore(self._radio, safe_gains)
+            self._gains = parameters.GainStore(self._radio, safe_gains)
             self._open(observes=observes)
         except BaseException:
             self._radio.link.close()
@@ -135,7 +138,7 @@ class ObservedVehicle(ABC):
         """Close the link; the vehicle is left unchanged."""
         self._radio.link.close()
         if self._secondary is not None:
-            self._secondary.source.close()
+            self._secondary.close()
 
     def parameters(self) -> dict[str, float]:
         """Read every parameter. Raises VehicleError if they do not arrive, SafeGainsError while the vehicle is only
@@ -169,7 +172,7 @@ class ObservedVehicle(ABC):
         change = self._identity.change
         if self._quarantine.is_active:
             self._quarantine.add(change)
-        elif why := f"{preparation.ARMED if self._radio.is_armed else ''} {change}".strip():
+        elif why := f"{ARMED if self._radio.is_armed else ''} {change}".strip():
             self._observe(why)
 
     def _identify(self) -> None:
@@ -180,8 +183,7 @@ class ObservedVehicle(ABC):
             self._identity.pinned = self._identity.pinned.completed_by(self.identity)
 
     def _request_telemetry(self) -> None:
-        radio = self._radio
-        set_up(radio, radio.profile.prepare(radio.target, float(self._options["telemetry_hz"])))
+        set_up(self._radio, self._radio.profile.prepare(self._radio.target, float(self._options["telemetry_hz"])))
 
     def _renew_telemetry(self) -> None:
         """Request telemetry again from a vehicle on the ground of which only heartbeats have arrived for 2 s, and

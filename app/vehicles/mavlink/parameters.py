@@ -6,10 +6,9 @@ import json
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from app.autopilots import commands
 from app.autopilots.autopilot import GainParameter, GainSet, check_gains
@@ -19,7 +18,6 @@ from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch
 from app.vehicles.end_texts import FAILURE_TEXTS
 from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 
@@ -28,7 +26,7 @@ LIST_ENDS_S: Final = 2.0
 """The list has ended if no parameter has arrived for this long."""
 
 
-def read_gains(radio: AutopilotLink, gain_set: GainSet, requested: Gains | None = None) -> dict[str, float]:
+def read_gains(radio: AutopilotLink, gain_set: GainSet, requested: Gains) -> dict[str, float]:
     """Return the gains on the vehicle, exactly as in `requested` where they are equal in single precision. Raises
     VehicleError if the vehicle does not reply."""
     held_now: dict[str, float] = {}
@@ -36,7 +34,7 @@ def read_gains(radio: AutopilotLink, gain_set: GainSet, requested: Gains | None 
         wire = read_parameter(radio, gain.parameter)
         if wire is None:
             raise _unconfirmed(gain)
-        held_now[gain.gain] = gain.read(wire, None if requested is None else requested[gain.gain])
+        held_now[gain.gain] = gain.read(wire, requested[gain.gain])
     return held_now
 
 
@@ -86,15 +84,12 @@ def _list(radio: AutopilotLink) -> dict[int, Parameter]:
     received: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
     while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.timeout_factor and not _is_complete(received):
-        if found := _listed(radio.listen(radio.reply_timeout_s)):
-            received |= found
+        packets = radio.listen(radio.reply_timeout_s)
+        found = [each.measurement for each in packets if isinstance(each.measurement, Parameter)]
+        if listed := {each.place: each for each in found if each.place is not None}:
+            received |= listed
             last_s = radio.clock.now_s()
     return received
-
-
-def _listed(packets: list[PacketReceived]) -> dict[int, Parameter]:
-    found = (each.measurement for each in packets if isinstance(each.measurement, Parameter))
-    return {each.place: each for each in found if each.place is not None}
 
 
 def _fetched(radio: AutopilotLink, place: int) -> dict[int, Parameter]:
@@ -258,8 +253,7 @@ def written(gains: Gains) -> str:
 # ---- parameters of the takeoff
 
 
-@dataclass(frozen=True, slots=True)
-class ChangedParameter:
+class ChangedParameter(NamedTuple):
     """Value of a parameter before and during a trial."""
 
     before: float
@@ -367,11 +361,10 @@ class TrialParameters:
         if not changed:
             file.unlink(missing_ok=True)
             return
-        parameters = {name: [one.before, one.during] for name, one in changed.items()}
         file.parent.mkdir(mode=0o700, exist_ok=True)
         fresh = file.with_suffix(".new")
         with fresh.open("w", encoding="utf-8") as writing:
-            json.dump({"vehicle": self._vehicle(), "parameters": parameters}, writing)
+            json.dump({"vehicle": self._vehicle(), "parameters": changed}, writing)
             writing.flush()
             os.fsync(writing.fileno())
         fresh.replace(file)

@@ -21,11 +21,17 @@ from app.vehicles.base import (
     SafeGainsError,
     VehicleError,
 )
-from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
+from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mavlink.boot_clock import unwrapped
-from app.vehicles.mavlink.ground_observation import STANDS_WITHIN_M, GroundObservation, find_reception
+from app.vehicles.mavlink.on_ground import (
+    ARMED,
+    LAND_FIRST,
+    ONE_VEHICLE,
+    STANDS_WITHIN_M,
+    GroundObservation,
+    find_reception,
+)
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE
 from app.vehicles.mavlink.radio import AutopilotLink
 
 POSITIONS_HZ: Final = 40.0
@@ -77,7 +83,6 @@ MOTORS_OFF: Final = Check(
     "Motors off",
     "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
 )
-OWN_CHECKS: Final = Check("own_checks", "Arming checks of the autopilot")
 SECOND_SOURCE: Final = Check(
     "second_source", "Second source of altitude", "Check that it tracks the vehicle and streams, or fly without it."
 )
@@ -91,9 +96,7 @@ HOME: Final = Check(
     "Distance from HOME",
     "Move it closer to the place where it was switched on, or reduce its “Maximum distance from the start”.",
 )
-FLIGHT_TIME: Final = Check("flight time", "Flight time")
 ALTITUDES: Final = Check("altitudes", "Altitudes", "Choose a lower height, or smaller steps.")
-HOVER: Final = Check("hover_throttle", "Hover throttle")
 
 
 def evaluate_items(
@@ -112,13 +115,17 @@ def evaluate_items(
         items += [FLIGHT_PLAN.item(not plan_problem, plan_problem or blocks, blocks), _ground_reference(radio, watched)]
     if radio.profile.stop_settings:
         items.append(_stopping(radio))
-    return (*items, *_own_checks(radio), *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
+    return (
+        *items,
+        *_own_checks(radio),
+        *(evaluate_requirement(radio, requirement) for requirement in radio.profile.requirements),
+    )
 
 
-def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
+def evaluate_secondary(secondary: AltitudeSource, watched: GroundObservation) -> CheckItem:
     rate_hz = len(watched.secondary_m) / watched.seconds
-    rate = f"{rate_hz:.0f} samples per second of {secondary.source.name}"
-    found = secondary.source.trouble.removesuffix(".") or rate
+    rate = f"{rate_hz:.0f} samples per second of {secondary.name}"
+    found = secondary.trouble.removesuffix(".") or rate
     return SECOND_SOURCE.item(rate_hz >= SECONDARY_HZ, found, f"{SECONDARY_HZ:g} per second or more")
 
 
@@ -142,18 +149,13 @@ def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radiu
 def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
     """Check that the flight plan does not land the vehicle before its record of `record_s` is complete."""
     needed_s = record_s + LAND_COMMAND_S
-    return FLIGHT_TIME.item(
+    return Check("flight time", "Flight time").item(
         needed_s <= plan_time_s,
         f"{needed_s:g} s for the record and the command to land",
         f"{plan_time_s:g} s or less: after it the flight plan lands it",
         hint="Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
         f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
     )
-
-
-def evaluate_set_point_requirements(radio: AutopilotLink) -> tuple[CheckItem, ...]:
-    """Read and check the further requirements of a flight with several set points."""
-    return tuple(_failsafe(radio, requirement) for requirement in radio.profile.set_point_requirements)
 
 
 def evaluate_set_points(set_points: SetPoints) -> CheckItem:
@@ -174,7 +176,7 @@ def evaluate_hover(hover_throttle: float | None, limits: HoverLimits | None) -> 
     item while one of the two is not known."""
     if hover_throttle is None or limits is None:
         return ()
-    item = HOVER.item(
+    item = Check("hover_throttle", "Hover throttle").item(
         limits.low <= hover_throttle <= limits.high,
         f"{hover_throttle:.2f} in the last flight",
         limits.words,
@@ -217,24 +219,20 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
 
 
 def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
-    """Return the item of its arming checks; none if it reports nothing of them, by events neither."""
-    if not radio.seen.may_arm and not radio.reports_armed:
-        _request_checks(radio)
-    ready = radio.seen.may_arm
-    if ready is None:
-        return ()
-    found = "passed" if ready else f"not passed; {_reasons(radio)}"
-    return (OWN_CHECKS.item(ready, found, "passed", hint=_checks_hint(radio)),)
-
-
-def _request_checks(radio: AutopilotLink) -> None:
-    """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
-    if (checks := radio.profile.checks) is not None:
+    """Return the item of its arming checks, requested as events if it supports them; none if it reports nothing of
+    them, by events neither."""
+    checks = radio.profile.checks
+    if checks is not None and not radio.seen.may_arm and not radio.reports_armed:  # earlier events were missed
         radio.request(
             commands.command(radio.target, checks.command),
             lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
             attempts=_CHECKS_ATTEMPTS,
         )
+    ready = radio.seen.may_arm
+    if ready is None:
+        return ()
+    found = "passed" if ready else f"not passed; {_reasons(radio)}"
+    return (Check("own_checks", "Arming checks of the autopilot", _checks_hint(radio)).item(ready, found, "passed"),)
 
 
 def _reasons(radio: AutopilotLink) -> str:
@@ -303,7 +301,8 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
     return GROUND_REFERENCE.item(is_set and watched.is_at_reference, found, needed)
 
 
-def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
+def evaluate_requirement(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
+    """Read the parameter of a requirement and check it."""
     parameter = radio.target.newer_names.get(requirement.parameter, requirement.parameter)
     value = read_parameter(radio, parameter)
     off = " (off)" if value == 0.0 and not requirement.values else ""

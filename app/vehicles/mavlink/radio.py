@@ -1,22 +1,37 @@
-"""Communication with one vehicle by its profile: repeated requests, one in flight at a time, and reception."""
+"""Communication with one vehicle by its profile: opening of its link by its options, repeated requests, one in flight
+at a time, and reception.
+"""
 
-from collections.abc import Callable, Mapping
+import datetime as dt
+from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
-from app.autopilots.autopilot import Autopilot, AutopilotError, HoverLimits
+from app.autopilots.autopilot import Autopilot
 from app.autopilots.commands import Outgoing, Target
-from app.autopilots.dialects import Message, source_component
+from app.autopilots.dialects import read_key, source_component
 from app.autopilots.measurements import BlockEntered, Heartbeat, Measurement
+from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import Clock
-from app.vehicles.base import VehicleError
+from app.vehicles.kinds import Options
+from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HEARTBEATS_MISSED
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.memory import VehicleMemory
+from app.vehicles.mavlink.transports import Transport
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
 JUST_HEARD_S: Final = 0.1
+LISTEN_S: Final = 0.1
+"""Longest time for which an operation that waits receives at a go."""
+HEARTBEAT_WITHIN_S: Final = 5.0
+"""Time within which a vehicle that is on is heard."""
+TAKEOFF_ALTITUDE_M: Final = 3.0
+MAX_UNSCALED_SPEED: Final = 4.0
+"""Up to this clock speed the timeouts of a simulated vehicle are those of a real one. Beyond, they are longer by its
+clock, because the pauses of a busy computer are in wall time."""
 _PAUSE_S: Final = 0.2
 _REFERENCE_TAKES_S: Final = 4.0
 """Least time in which a flight plan sets its ground reference: 10 s in the stock plans, but fewer by the clock of the
@@ -26,9 +41,10 @@ ground if a simulation is fast, or reports arrive again late."""
 class AutopilotLink:
     """Link to an autopilot by its profile, for use by one thread.
 
-    Replies are waited for `reply_timeout_s`. Only messages of the autopilot's own component are measured; `on_message`
-    is called with every message of any component. Operations that wait for the vehicle call `listen`, which calls
-    `on_wait` with the packets received, at least every `reply_timeout_s`; an exception from it ends the operation.
+    Replies are waited for `reply_timeout_s`. Only messages of the autopilot's own component are measured, or of any
+    while that is unknown; `on_message` is called with every message of any component. Operations that wait for the
+    vehicle call `listen`, which calls `on_wait` with the packets received, at least every `reply_timeout_s`; an
+    exception from it ends the operation.
     """
 
     def __init__(
@@ -101,13 +117,6 @@ class AutopilotLink:
         names = {number: name for name, number in self.target.blocks.items()}
         return "" if self.seen.block is None else names.get(self.seen.block, f"block {self.seen.block}")
 
-    def hover_limits(self, parameters: Mapping[str, float]) -> HoverLimits | None:
-        """Return those of `Autopilot.hover_limits`. Raises VehicleError for a parameter out of its range."""
-        try:
-            return self.profile.hover_limits(parameters)
-        except AutopilotError as error:
-            raise VehicleError(error.message, hint=error.hint) from error
-
     def send(self, *messages: Outgoing) -> None:
         """Send messages. Raises LinkError if the link is closed."""
         for message in messages:
@@ -133,29 +142,20 @@ class AutopilotLink:
         packets = [
             PacketReceived(self.profile.measure(received.message), received.received_s)
             for received in messages
-            if self._is_autopilots(received.message)
+            if self.target.component in (0, source_component(received.message))
         ]
         for each in packets:
             if isinstance(each.measurement, Heartbeat):
-                self._forget_absent(each.now_s)
+                self.forget_absent(each.now_s)
             if isinstance(each.measurement, BlockEntered):
                 self._note_ground_reference(each.measurement.number, each.now_s)
             self.seen.note(each.measurement, each.now_s)
         return packets
 
-    def receive_pending(self) -> None:
-        """Process the packets that have arrived, and discard the identity of an absent vehicle."""
-        self.listen(0.0)
-        self._forget_absent(self.clock.now_s())
-
-    def _forget_absent(self, now_s: float) -> None:
+    def forget_absent(self, now_s: float) -> None:
         """Discard the identity after an absence, because another vehicle may take its place."""
         if now_s - self.seen.heartbeat_s > self.silence_s:
             self.seen.forget_vehicle()
-
-    def _is_autopilots(self, message: Message) -> bool:
-        """Whether the message is of the autopilot's component, or of any while that is unknown."""
-        return self.target.component in (0, source_component(message))
 
     def request(
         self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
@@ -170,3 +170,50 @@ class AutopilotLink:
                     if packet.measurement is not None and fits(packet.measurement):
                         return packet.measurement
         return None
+
+
+def open_radio(
+    options: Options,
+    clock: Clock,
+    *,
+    on_message: Callable[[Received], None] | None,
+    on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
+    is_silent: Callable[[], bool] = lambda: False,
+    transport: Transport | None = None,
+) -> AutopilotLink:
+    """Open the link to a vehicle.
+
+    `clock` is the vehicle's time; for `on_message` and `on_wait` see AutopilotLink;
+    no heartbeats are sent while `is_silent` returns true; `transport` replaces the address and the thread that reads
+    it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
+    used.
+    """
+    profile = AUTOPILOTS[str(options["autopilot"])]
+    key_file, log_folder = str(options["signing_key_file"]), str(options["log_folder"])
+    log_name = f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"  # a new one for every opening
+    link = Link(
+        addresses.parse(str(options["address"])),
+        profile.dialect,
+        clock=clock,
+        target_system=int(options["system_id"]) or None,
+        make=profile.autopilot,
+        tlog=Path(log_folder) / log_name if log_folder else None,
+        signing_key=read_key(Path(key_file)) if key_file else None,
+        transport=transport,
+        is_silent=is_silent,
+    )
+    target = Target(
+        system=0,
+        aircraft=int(options["aircraft_id"]),
+        waypoint=int(options["climb_waypoint"]),
+        altitude_m=TAKEOFF_ALTITUDE_M,
+    )
+    return AutopilotLink(
+        link,
+        profile,
+        clock,
+        target,
+        reply_timeout_s=REPLY_TIMEOUT_S * max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED),
+        on_message=on_message,
+        on_wait=on_wait,
+    )

@@ -30,14 +30,10 @@ class TlogWriter:
             ) from error
         self._frames: queue.SimpleQueue[tuple[int, bytes] | None] = queue.SimpleQueue()
         self._closing = threading.Event()
-        self._problem: str | None = None
+        self.problem: str | None = None
+        """Reason why the file is incomplete, None if it is complete."""
         self._thread = threading.Thread(target=self._run, name=f"tlog {path.name}", daemon=True)
         self._thread.start()
-
-    @property
-    def problem(self) -> str | None:
-        """Reason why the file is incomplete, None if it is complete."""
-        return self._problem
 
     def write(self, time_us: int, frame: bytes) -> None:
         """Queue `frame`, which is stored within a fraction of a second; `time_us` is since 1970."""
@@ -49,7 +45,7 @@ class TlogWriter:
         self._frames.put(None)
         self._thread.join(STORED_WITHIN_S)
         if self._thread.is_alive():
-            self._problem = f"{self._path} was not stored within {STORED_WITHIN_S:g} s"
+            self.problem = f"{self._path} was not stored within {STORED_WITHIN_S:g} s"
 
     def _run(self) -> None:
         more, unstored = True, b""
@@ -69,9 +65,9 @@ class TlogWriter:
             while data:
                 data = data[self._file.write(data) :]
         except OSError as error:
-            self._problem = f"{self._path} is not complete: {error.strerror or error}"
+            self.problem = f"{self._path} is not complete: {error.strerror or error}"
         else:
-            self._problem = None
+            self.problem = None
         return data
 
 

@@ -81,7 +81,37 @@ def open_transport(address: Address) -> Transport:
             return StreamTransport((device, baud), lambda: _serial_port(device, baud))
 
 
-class UdpTransport:
+class _Waking:
+    """What waits for a descriptor, or for `wake` from another thread."""
+
+    def __init__(self) -> None:
+        self._wake_receiver, self._wake_sender = socket.socketpair()
+        self._wake_receiver.setblocking(False)
+        self._wake_sender.setblocking(False)
+
+    def _wait(self, timeout_s: float, descriptor: int | None = None, *, writes: bool = False) -> tuple[bool, bool]:
+        """Return whether the descriptor is readable, and with `writes` writable; neither after a timeout or wake."""
+        polled = select.poll()
+        polled.register(self._wake_receiver, select.POLLIN)
+        if descriptor is not None:
+            polled.register(descriptor, select.POLLIN | (select.POLLOUT if writes else 0))
+        found = dict(polled.poll(max(timeout_s, 0.0) * 1000.0))
+        if self._wake_receiver.fileno() in found:
+            with contextlib.suppress(BlockingIOError):
+                self._wake_receiver.recv(LARGEST_READ)
+        events = 0 if descriptor is None else found.get(descriptor, 0)
+        return bool(events & ~select.POLLOUT), bool(events & ~select.POLLIN)
+
+    def wake(self) -> None:
+        with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
+            self._wake_sender.send(b"!")
+
+    def close(self) -> None:
+        self._wake_receiver.close()
+        self._wake_sender.close()
+
+
+class UdpTransport(_Waking):
     """Datagrams between our address and one peer's."""
 
     def __init__(self, local: Peer, remote: Peer | None) -> None:
@@ -95,16 +125,12 @@ class UdpTransport:
         except OSError as error:
             self._socket.close()
             raise _cannot_open(f"udp port {local[1]} of {local[0]}", error) from error
-        self._waiter = _Waiter()
-        self._remote = remote
-
-    @property
-    def remote(self) -> Peer | None:
-        return self._remote
+        super().__init__()
+        self.remote = remote
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         datagrams: list[tuple[bytes, Peer]] = []
-        is_readable, _ = self._waiter.wait(timeout_s, self._socket.fileno())
+        is_readable, _ = self._wait(timeout_s, self._socket.fileno())
         if is_readable:
             with contextlib.suppress(BlockingIOError):
                 while len(datagrams) < BATCH:
@@ -112,67 +138,57 @@ class UdpTransport:
         return datagrams
 
     def write(self, data: bytes) -> bool:
-        if self._remote is None:
+        if self.remote is None:
             return False
         try:
-            self._socket.sendto(data, self._remote)
+            self._socket.sendto(data, self.remote)
         except OSError:  # the buffer is full or the network is down; the next one may succeed
             return False
         return True
 
     def adopt(self, peer: Peer) -> None:
-        self._remote = peer
-
-    def wake(self) -> None:
-        self._waiter.wake()
+        self.remote = peer
 
     def close(self) -> None:
-        self._waiter.close()
+        super().close()
         self._socket.close()
 
 
-class _Stream(Protocol):
-    """An open, non-blocking descriptor."""
-
-    def fileno(self) -> int: ...
-    def close(self) -> None: ...
+_Stream = socket.socket | serial.Serial
+"""An open, non-blocking descriptor."""
 
 
-class StreamTransport:
+class StreamTransport(_Waking):
     """Stream of bytes to and from one peer; after it has broken, opening is retried every second."""
 
     def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
         """Open the stream by `opened`, which raises OSError on failure. Raises LinkError if that fails now."""
-        self._peer = peer
+        self.remote: Final = peer
         self._opened = opened
         try:
             self._stream: _Stream | None = opened()
         except OSError as error:
             raise _cannot_open(f"{peer[0]}:{peer[1]}", error) from error
-        self._waiter = _Waiter()
+        super().__init__()
         self._next_try_s = 0.0
         # Other threads use only the stream's descriptor, under this lock; the reader closes a broken stream.
         self._writing = threading.Lock()
         self._backlog = bytearray()
         self._is_broken = False
 
-    @property
-    def remote(self) -> Peer | None:
-        return self._peer
-
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         if self._is_broken:
             self._break()
         if self._stream is None:
-            self._waiter.wait(min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0)))
+            self._wait(min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0)))
             self._reopen()
             return []
-        is_readable, is_writable = self._waiter.wait(timeout_s, self._stream.fileno(), writes=bool(self._backlog))
+        is_readable, is_writable = self._wait(timeout_s, self._stream.fileno(), writes=bool(self._backlog))
         if is_writable:
             with self._writing:
                 self._flush(self._stream)
         data = self._receive(self._stream) if is_readable else b""
-        return [(data, self._peer)] if data else []
+        return [(data, self.remote)] if data else []
 
     def write(self, data: bytes) -> bool:
         with self._writing:
@@ -181,19 +197,16 @@ class StreamTransport:
             self._backlog += data
             self._flush(self._stream)
             if self._backlog or self._is_broken:
-                self._waiter.wake()
+                self.wake()
             return not self._is_broken
 
     def adopt(self, peer: Peer) -> None:
         """Do nothing: there is only one peer."""
 
-    def wake(self) -> None:
-        self._waiter.wake()
-
     def close(self) -> None:
         if self._stream is not None:
             self._stream.close()
-        self._waiter.close()
+        super().close()
 
     def _receive(self, stream: _Stream) -> bytes:
         """Read a readable stream; if it contains nothing, it has ended."""
@@ -232,36 +245,6 @@ class StreamTransport:
             self._stream = self._opened()
         except OSError:
             self._next_try_s = time.monotonic() + REOPEN_EVERY_S
-
-
-class _Waiter:
-    """Waits for a descriptor, or for `wake` from another thread."""
-
-    def __init__(self) -> None:
-        self._wake_receiver, self._wake_sender = socket.socketpair()
-        self._wake_receiver.setblocking(False)
-        self._wake_sender.setblocking(False)
-
-    def wait(self, timeout_s: float, descriptor: int | None = None, *, writes: bool = False) -> tuple[bool, bool]:
-        """Return whether the descriptor is readable, and with `writes` writable; neither after a timeout or wake."""
-        polled = select.poll()
-        polled.register(self._wake_receiver, select.POLLIN)
-        if descriptor is not None:
-            polled.register(descriptor, select.POLLIN | (select.POLLOUT if writes else 0))
-        found = dict(polled.poll(max(timeout_s, 0.0) * 1000.0))
-        if self._wake_receiver.fileno() in found:
-            with contextlib.suppress(BlockingIOError):
-                self._wake_receiver.recv(LARGEST_READ)
-        events = 0 if descriptor is None else found.get(descriptor, 0)
-        return bool(events & ~select.POLLOUT), bool(events & ~select.POLLIN)
-
-    def wake(self) -> None:
-        with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
-            self._wake_sender.send(b"!")
-
-    def close(self) -> None:
-        self._wake_receiver.close()
-        self._wake_sender.close()
 
 
 def _connected(host: str, port: int) -> socket.socket:

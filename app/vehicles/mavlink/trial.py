@@ -10,7 +10,6 @@ from app.autopilots.commands import Action, Outgoing, Target, read_parameter
 from app.autopilots.measurements import Position
 from app.vehicles.base import Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import Requester, StopRequest
-from app.vehicles.mavlink.command_sequence import CommandSequence
 from app.vehicles.mavlink.events import (
     ActionRefused,
     Command,
@@ -34,6 +33,7 @@ from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.sent_commands import CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import advance, begin
 from app.vehicles.mavlink.trial_state import LANDING, State

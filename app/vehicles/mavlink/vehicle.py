@@ -5,24 +5,24 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
+from app.autopilots.autopilot import AutopilotError
 from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
 from app.vehicles.end_texts import cause_text
 from app.vehicles.flight_end import FlightEnd, Landing, withdrawn_by
-from app.vehicles.mavlink import flight_preparation, ground_observation, preflight, preparation, records
 from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink import on_ground, parameters, preflight, records
 from app.vehicles.mavlink.connection import VehicleConnection
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
-from app.vehicles.mavlink.flight_preparation import flies_steps
-from app.vehicles.mavlink.flown_set_points import Reference, with_flown_set_points
-from app.vehicles.mavlink.ground_observation import GroundObservation
-from app.vehicles.mavlink.parameters import written
-from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
-from app.vehicles.mavlink.repeated_command import RepeatedCommand
-from app.vehicles.mavlink.set_point_schedule import referred_from_s
+from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference, with_flown_set_points
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.sent_commands import RepeatedCommand, set_up
+from app.vehicles.mavlink.set_point_schedule import referred_from_s, with_hold
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial import TrialRunner
 from app.vehicles.mavlink.trial_state import State, Trial
@@ -60,7 +60,7 @@ class MavlinkVehicle(VehicleConnection):
         troubles = (
             f"The telemetry log {problem}." if problem else "",
             _RESTARTED if self._gains.have_restarted and self._flight is None else "",
-            self._secondary.source.trouble if self._secondary is not None else "",
+            self._secondary.trouble if self._secondary is not None else "",
             self._flight.trouble if self._flight is not None else "",
             self._repeated.trouble if self._repeated is not None else "",
         )
@@ -81,7 +81,7 @@ class MavlinkVehicle(VehicleConnection):
         self._renew_telemetry()
         self._quarantine.require_none()
         self._identity.require_uid()
-        preparation.require_disarmed(self._radio)
+        on_ground.require_disarmed(self._radio)
         if self._quarantine.state is State.IDLE:
             self._quarantine.enter(State.SET_GAINS)
         try:
@@ -96,7 +96,7 @@ class MavlinkVehicle(VehicleConnection):
         self._quarantine.require_none()
         self._identify()
         self._request_telemetry()
-        watched = ground_observation.observe(self._radio, self._secondary, watched_s=STANDSTILL_S)
+        watched = on_ground.observe(self._radio, self._secondary, watched_s=STANDSTILL_S)
         restarted = self._gains.have_restarted
         self._identify()
         self._quarantine.require_none()
@@ -106,7 +106,9 @@ class MavlinkVehicle(VehicleConnection):
         if restarted or self._gains.staged is None:
             raise VehicleError("The vehicle restarted.", hint=_STAGE_AGAIN)
         if (held := self._gains.read()) != self._gains.staged:
-            raise VehicleError(f"The vehicle holds {written(held)}, not the staged gains.", hint=_STAGE_AGAIN)
+            raise VehicleError(
+                f"The vehicle holds {parameters.written(held)}, not the staged gains.", hint=_STAGE_AGAIN
+            )
 
     # ---- flying
 
@@ -130,12 +132,14 @@ class MavlinkVehicle(VehicleConnection):
             self._require_staged()
             self._loop: dict[str, float] = {}
             self._radio.target = replace(self._radio.target, altitude_m=order.set_points.altitudes_m[0])
-            if flies_steps(order):
+            if _flies_steps(order):
                 self._prepare_set_points(order)
             ground = self._observe_ground(order)
             self._require_staged()  # again: a restart meanwhile leaves none
-            reference = flight_preparation.reference_of(order, self._radio, ground.altitude_m)
-            self._parameters.set(flight_preparation.settings_of(order, self._radio))
+            reference = self._reference(order, ground.altitude_m)
+            profile, target = self._radio.profile, self._radio.target
+            further = profile.set_point_settings if _flies_steps(order) else ()
+            self._parameters.set((*profile.take_off_settings(target), *further))
             stop = should_stop()
         except BaseException as error:
             if isinstance(error, VehicleError):
@@ -161,24 +165,46 @@ class MavlinkVehicle(VehicleConnection):
             )
 
     def _prepare_set_points(self, order: FlightOptions) -> None:
-        flight_preparation.compile_reference(order, self._radio)
+        """Request the telemetry that a flight with several set points needs, and read the parameters of its loop, which
+        the replica would otherwise replace by defaults. The reference is computed once: the first computation may take
+        seconds, which must not pass after the ground was observed."""
+        radio, profile = self._radio, self._radio.profile
+        if (reference := self._reference(order, 0.0)) is not None:
+            reference(order.set_points, np.zeros(1))
         self._identify()
         self._quarantine.require_none()
-        self._loop = flight_preparation.prepare_set_points(self._radio, self._gains.release)
+        set_up(radio, tuple(each.step(radio.target) for each in profile.set_point_telemetry))
+        if profile.loop_parameters:
+            self._loop = parameters.read_loop(radio, profile.loop_parameters[self._gains.release], profile.may_lack)
 
-    def _observe_ground(self, order: FlightOptions) -> GroundObservation:
+    def _reference(self, order: FlightOptions, ground_m: float) -> Reference | None:
+        """Return the function that computes the autopilot's own reference; None if it sends that, or if it is not
+        needed."""
+        if not _flies_steps(order) or self._radio.profile.reference != "replica":
+            return None
+        return lambda set_points, time_s: simulate_reference(set_points, ground_m, time_s, order.record_s)
+
+    def _observe_ground(self, order: FlightOptions) -> on_ground.GroundObservation:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
-        needed = preflight.evaluate_set_point_requirements(self._radio) if flies_steps(order) else ()
+        radio = self._radio
+        further = radio.profile.set_point_requirements if _flies_steps(order) else ()
+        needed = [preflight.evaluate_requirement(radio, requirement) for requirement in further]
         watched, items = self._check(STANDSTILL_S)
-        hover = preflight.evaluate_hover(self._hover_throttle, self._radio.hover_limits(self._loop))
-        needed = (*flight_preparation.evaluate_time(order, self._radio, self._options), *needed, *hover)
+        try:
+            limits = radio.profile.hover_limits(self._loop)
+        except AutopilotError as error:
+            raise VehicleError(error.message, hint=error.hint) from error
+        needed += preflight.evaluate_hover(self._hover_throttle, limits)
+        if radio.profile.flying_blocks:
+            plan_time_s = float(self._options["plan_time_s"])
+            needed.insert(0, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
         self._quarantine.require_none()
         preflight.require((*items, *needed, preflight.evaluate_set_points(order.set_points)))
         return watched
 
     def _fly(
         self,
-        ground: GroundObservation,
+        ground: on_ground.GroundObservation,
         order: FlightOptions,
         reference: Reference | None,
         on_sample: Callable[[Sample], None],
@@ -187,7 +213,7 @@ class MavlinkVehicle(VehicleConnection):
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._quarantine.enter(State.ARM)
-        plan = flight_preparation.plan_of(order, ground, self._radio, self._options, self._gains)
+        plan = self._plan(order, ground)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(),
@@ -220,6 +246,24 @@ class MavlinkVehicle(VehicleConnection):
             self._keep_landing(flown.trial)
         return flown
 
+    def _plan(self, order: FlightOptions, ground: on_ground.GroundObservation) -> Plan:
+        """Return the plan of a flight from there, with the set points of the order."""
+        profile, target = self._radio.profile, self._radio.target
+        holds = _flies_steps(order) and profile.holds_first
+        return Plan(
+            autopilot=profile,
+            safe_gains=self._gains.safe_settings,
+            trial_gains=self._gains.staged_settings,
+            blocks={number: name for name, number in target.blocks.items()},
+            ground_m=0.0,
+            set_point_m=target.altitude_m,
+            set_points=with_hold(order.set_points) if holds else order.set_points,
+            record_s=order.record_s,
+            min_battery_v=float(self._options["min_battery_v"]),
+            radius_m=float(self._options["radius_m"]),
+            timeout_factor=self._radio.timeout_factor,
+        ).on_ground_at(ground.altitude_m)
+
     def _keep_landing(self, trial: Trial) -> None:
         """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
         it."""
@@ -233,10 +277,10 @@ class MavlinkVehicle(VehicleConnection):
     # ---- records
 
     @property
-    def _scored(self) -> Scored:
+    def _scored(self) -> records.Scored:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
-    def _record(self, flown: TrialRunner, ground: GroundObservation) -> FlightRecord:
+    def _record(self, flown: TrialRunner, ground: on_ground.GroundObservation) -> FlightRecord:
         """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
         aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
@@ -259,10 +303,10 @@ class MavlinkVehicle(VehicleConnection):
         if records.ending_of(trial) == "completed":
             found = records.hover_throttle_of(own, until_s=referred_from_s(plan) + SETTLED_FOR_S)
             self._hover_throttle = self._hover_throttle if found is None else found
-        both = AlignedRecord(trajectory=own)
+        both = records.AlignedRecord(trajectory=own)
         if self._secondary is not None:
-            zero_s, name = start_s + flown.offset_s, self._secondary.source.name
-            both = add_secondary_altitude(
+            zero_s, name = start_s + flown.offset_s, self._secondary.name
+            both = records.add_secondary_altitude(
                 both.trajectory, self._secondary.seen, name=name, zero_s=zero_s, scored=self._scored
             )
         lands = self._repeated is not None and self._repeated.action is Action.LAND
@@ -273,9 +317,14 @@ class MavlinkVehicle(VehicleConnection):
             settings={**self._options, **self._loop, **both.settings},
         )
 
-    def _not_begun(self, ground: GroundObservation, end: FlightEnd) -> FlightRecord:
+    def _not_begun(self, ground: on_ground.GroundObservation, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         datum_m = ground.altitude_m if self._radio.profile.climbs_from_ground else 0.0
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, datum_m)
         return FlightRecord(trajectory=trajectory, ending="aborted", end=end, settings=self._options)
+
+
+def _flies_steps(order: FlightOptions) -> bool:
+    """Whether set points follow the takeoff's."""
+    return len(order.set_points.times_s) > 1

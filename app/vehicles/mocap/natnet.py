@@ -12,10 +12,8 @@ from natnet import NatNetClient, NatNetError, Version
 
 from app.core.clock import Clock
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.altitude_sources import SourceSample
-from app.vehicles.mavlink.link import Received
+from app.vehicles.mavlink.altitude_sources import SILENT_S, AltitudeSource, Pose
 from app.vehicles.mocap.addresses import NatNetAddress
-from app.vehicles.mocap.stream import SILENT_S, PoseStream
 
 ANSWERED_WITHIN_S: Final = 1.0
 ATTEMPTS: Final = 3
@@ -58,15 +56,14 @@ class _Client(Protocol):
     def shutdown(self) -> None: ...
 
 
-class NatNetSource:
+class NatNetSource(AltitudeSource):
     """Source of altitude received over NatNet, in its own thread, which polls for packets every 4 ms."""
 
     def __init__(self, address: NatNetAddress, clock: Clock) -> None:
         """Connect to the server and wait for the body. Raises VehicleError if the server does not answer, no frames
         arrive, or the body is not among those streamed."""
-        self.name: Final = f"rigid body {address.body} of the motion capture at {address.host}"
+        super().__init__(f"rigid body {address.body} of the motion capture at {address.host}")
         self._address, self._clock = address, clock
-        self._stream = PoseStream()
         self._streamed_bodies: set[int] = set()
         self._frame_s: float | None = None
         self._client = self._connect()
@@ -85,14 +82,8 @@ class NatNetSource:
             return f"Reception of {self.name} has stopped."
         if self._frame_s is not None and (silent_s := time.monotonic() - self._frame_s) > SILENT_S:
             return f"Nothing was received for {self.name} in the last {silent_s:.0f} s."
-        newest = self._stream.newest
+        newest = self.newest
         return f"The cameras do not see {self.name}." if newest is not None and not newest.tracking_valid else ""
-
-    def on_message(self, received: Received) -> None:
-        """Ignore messages of the vehicle's link."""
-
-    def take(self) -> Sequence[SourceSample]:
-        return self._stream.take()
 
     def close(self) -> None:
         self._closing.set()
@@ -100,9 +91,8 @@ class NatNetSource:
         self._client.shutdown()
 
     def _connect(self) -> _Client:
-        host = self._address.host
         try:
-            server = socket.gethostbyname(host)
+            server = socket.gethostbyname(self._address.host)
             local = self._address.local or _interface_towards(server, self._address.command_port)
         except OSError as error:
             raise _unreachable(self._address, f"there is no route to it: {error.strerror or error}") from error
@@ -135,10 +125,10 @@ class NatNetSource:
                 hint=f"Set it to NatNet {_FIRST_WITH_TRACKING} or newer.",
             )
         until_s = time.monotonic() + SEEN_WITHIN_S
-        while self._stream.newest is None and time.monotonic() < until_s:
+        while self.newest is None and time.monotonic() < until_s:
             self._process_data()
             time.sleep(POLL_S)
-        if self._stream.newest is None:
+        if self.newest is None:
             raise self._absent()
 
     def _absent(self) -> VehicleError:
@@ -169,13 +159,9 @@ class NatNetSource:
         for body in frame.rigid_bodies:
             self._streamed_bodies.add(body.id_num)
             if body.id_num == self._address.body:
-                self._stream.put(
-                    body.pos[_UP[self._address.up]],
-                    (*body.pos, *body.rot),
-                    time_s=frame.suffix.timestamp,
-                    arrived_s=self._clock.now_s(),
-                    tracking_valid=bool(body.tracking_valid),
-                )
+                up_m, values = body.pos[_UP[self._address.up]], (*body.pos, *body.rot)
+                pose = Pose(frame.suffix.timestamp, up_m, values, tracking_valid=bool(body.tracking_valid))
+                self.put(pose, self._clock.now_s())
 
 
 def _interface_towards(server: str, port: int) -> str:

@@ -2,19 +2,17 @@
 
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.dialects import COMMON, Message, is_known, number
 from app.core.clock import Clock
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.altitude_sources import SourceSample
+from app.vehicles.mavlink.altitude_sources import SILENT_S, AltitudeSource, Pose
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import Peer, open_transport
 from app.vehicles.mocap.addresses import StreamAddress
-from app.vehicles.mocap.stream import SILENT_S, PoseStream
 
 _UP_FRAMES: Final = frozenset({4, 13, 15, 17, 19, 21})
 """Local frames of MAV_FRAME whose third axis points up (ENU and FLU; 13 to 19 are deprecated)."""
@@ -24,17 +22,6 @@ _COMPONENT: Final = 190
 _READ_S: Final = 0.1
 _LOST: Final = -1.0
 """ODOMETRY's quality when odometry has failed; 0: not reported."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """Pose at a time of the sender's clock; altitude is positive up from the sender's zero; `values` are all components
-    in the message."""
-
-    time_s: float
-    altitude_m: float
-    values: tuple[float, ...]
-    tracking_valid: bool
 
 
 def _odometry(message: Message) -> Pose:
@@ -55,14 +42,13 @@ READERS: Final[Mapping[str, Callable[[Message], Pose]]] = MappingProxyType(
 )
 
 
-class OdometrySource:
+class OdometrySource(AltitudeSource):
     """Odometry among the messages passed to `on_message`. Only the message type that arrives first is used, because
     two alternating estimates would not be one stream."""
 
     def __init__(self, name: str, clock: Clock) -> None:
-        self.name: Final = name
+        super().__init__(name)
         self._clock = clock
-        self._stream = PoseStream()
         self._kind = ""
         self._received_s = clock.now_s()
 
@@ -70,7 +56,7 @@ class OdometrySource:
     def trouble(self) -> str:
         if (silent_s := self._clock.now_s() - self._received_s) > SILENT_S:
             return f"No {self.name} was received for {silent_s:.0f} s."
-        newest = self._stream.newest
+        newest = self.newest
         return f"The {self.name} has failed." if newest is not None and not newest.tracking_valid else ""
 
     def on_message(self, received: Received) -> None:
@@ -79,20 +65,7 @@ class OdometrySource:
         if kind not in READERS or kind != (self._kind or kind):
             return
         self._kind, self._received_s = kind, arrived_s
-        pose = READERS[kind](message)
-        self._stream.put(
-            pose.altitude_m,
-            pose.values,
-            time_s=pose.time_s,
-            arrived_s=arrived_s,
-            tracking_valid=pose.tracking_valid,
-        )
-
-    def take(self) -> Sequence[SourceSample]:
-        return self._stream.take()
-
-    def close(self) -> None:
-        """Do nothing: the link belongs to the vehicle."""
+        self.put(READERS[kind](message), arrived_s)
 
 
 class StreamSource(OdometrySource):
@@ -130,7 +103,7 @@ class StreamSource(OdometrySource):
 
     def _await_odometry(self, address: StreamAddress) -> None:
         until_s = time.monotonic() + RECEIVED_WITHIN_S
-        while self._stream.newest is None:
+        while self.newest is None:
             if time.monotonic() > until_s:
                 raise VehicleError(
                     f"No ODOMETRY and no VISION_POSITION_ESTIMATE arrived at {address} within {RECEIVED_WITHIN_S:g} s.",

@@ -10,6 +10,7 @@ import struct
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -30,9 +31,8 @@ from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.mavlink_kind import MAVLINK
+from app.vehicles.mavlink_kind import MAVLINK, open_source
 from app.vehicles.mocap.addresses import parse as parse_source
-from app.vehicles.mocap.opening import open_source
 from bench.lockstep import Lockstep
 from tests.ports import free_port
 from tests.simdrone.ground import switched_on
@@ -127,7 +127,7 @@ class LockstepRig(Lockstep, _Heard):
 
     def switch_on_failsafes(self) -> None:
         """As a person does with another ground station before the first flight."""
-        with self.link() as link:
+        with closing(self.link()) as link:
             while link._vehicle_system is None:
                 link.receive(0.1)
             for name, kind, value in _FAILSAFES[self.autopilot]:
@@ -141,7 +141,7 @@ class LockstepRig(Lockstep, _Heard):
         last = self.told("PARAM_SET")[-1]
         whole = {name: int(number(last, name)) for name in ("target_system", "target_component", "param_type")}
         changed = number(last, "param_value") + 1.0
-        with self.link() as other:
+        with closing(self.link()) as other:
             other.send("PARAM_SET", **whole, param_id=text(last, "param_id"), param_value=changed)
 
     def take_the_place_of_every_vehicle(self, monkeypatch: pytest.MonkeyPatch) -> None:

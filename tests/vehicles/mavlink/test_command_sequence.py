@@ -5,10 +5,10 @@ from typing import cast
 from app.autopilots.commands import Action, Target
 from app.autopilots.measurements import CommandReply, Heartbeat, Measurement
 from app.autopilots.registry import AUTOPILOTS
-from app.vehicles.mavlink.command_sequence import CommandSequence
 from app.vehicles.mavlink.events import ActionDone, ActionRefused, PacketReceived
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.sent_commands import CommandSequence
 from tests.clocks import SimulatedClock
 from tests.vehicles.mavlink.test_repeated_command import Sent
 

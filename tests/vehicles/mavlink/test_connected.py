@@ -49,7 +49,7 @@ def connected(
 
 def enter_block(rig: LockstepRig, *blocks: int) -> None:
     """As somebody else's ground station does."""
-    with rig.link(target_system=31) as link:
+    with closing(rig.link(target_system=31)) as link:
         for block in blocks:
             link.send("MISSION_ACK", target_system=31, target_component=0, type=0)
             link.send("SCRIPT_ITEM", target_system=31, target_component=0, seq=block, name="")

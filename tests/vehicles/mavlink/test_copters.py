@@ -467,7 +467,7 @@ def test_parameters_of_a_copter_outlive_its_reboot_and_paparazzis_do_not() -> No
     ):
         with LockstepRig(autopilot) as rig:
             before = rig.drone.autopilot.parameters[name]
-            with rig.link(target_system=rig.drone.autopilot.system) as link:
+            with closing(rig.link(target_system=rig.drone.autopilot.system)) as link:
                 to = {"target_system": rig.drone.autopilot.system, "target_component": 0}
                 link.send("PARAM_SET", **to, param_id=name, param_type=9, param_value=before + 1.0)
                 rig.wait_s(0.2)

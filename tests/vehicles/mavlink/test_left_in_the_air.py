@@ -1,7 +1,7 @@
 """A vehicle that the process that flew it left in the air, and the next process that finds it there."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from itertools import pairwise
 from typing import Final
 
@@ -32,7 +32,7 @@ def left_in_the_air(autopilot: str) -> Iterator[LockstepRig]:
             rig.switch_on_failsafes()
             rig.wait_s(15.0)  # until its estimator is ready, and its plan has set the ground reference
             profile, target = AUTOPILOTS[autopilot], Target(system=1, aircraft=1)
-            with rig.link(target_system=1) as link:
+            with closing(rig.link(target_system=1)) as link:
                 for action in (Action.ARM, Action.TAKE_OFF):
                     for outgoing in (sent for step in profile.steps(action, target) for sent in step.sends):
                         link.receive(0.0)

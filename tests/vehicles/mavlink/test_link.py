@@ -8,7 +8,7 @@ import threading
 import tty
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -32,8 +32,7 @@ from app.vehicles.mavlink.link import (
     UNATTENDED_AFTER_S,
     Link,
 )
-from app.vehicles.mavlink.link_health import LossCounter
-from app.vehicles.mavlink.other_peers import GONE_AFTER_S, INTERVAL_S
+from app.vehicles.mavlink.reception import GONE_AFTER_S, INTERVAL_S, LossCounter
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
@@ -72,7 +71,7 @@ def paparazzi() -> Iterator[FakeVehicleEndpoint]:
 
 @pytest.fixture
 def link(paparazzi: FakeVehicleEndpoint) -> Iterator[Link]:
-    with Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31) as link:
+    with closing(Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)) as link:
         yield link
 
 
@@ -112,7 +111,7 @@ class HurriedClock(ScaledClock):
 
 def test_a_call_waits_no_longer_than_asked_by_the_clock(paparazzi: FakeVehicleEndpoint) -> None:
     clock = HurriedClock()
-    with Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link:
+    with closing(Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31)) as link:
         assert link.receive(3600.0) == []
     assert clock.asked_s == [3600.0]
 
@@ -146,7 +145,7 @@ def link_beside(
     """A link that has heard its vehicle, and another sender."""
     clock = ManualClock()
     with (
-        Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
+        closing(Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31)) as link,
         FakeVehicleEndpoint(PAPARAZZI, component=190, host=host) as other,
     ):
         paparazzi.send(heartbeat(paparazzi, autopilot=9))
@@ -225,7 +224,7 @@ def test_a_vehicle_that_returns_from_another_port_is_received_and_commanded_agai
 ) -> None:
     clock = ManualClock()
     with (
-        Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
+        closing(Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31)) as link,
         FakeVehicleEndpoint(PAPARAZZI, component=190) as again,
     ):
         paparazzi.send(heartbeat(paparazzi, autopilot=9))
@@ -257,7 +256,7 @@ def test_messages_of_another_component_do_not_count_as_the_autopilots(
 
 
 def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(paparazzi: FakeVehicleEndpoint) -> None:
-    with Link(paparazzi.address, PAPARAZZI, clock=CLOCK) as link:
+    with closing(Link(paparazzi.address, PAPARAZZI, clock=CLOCK)) as link:
         station = FakeVehicleEndpoint(PAPARAZZI, system=255)
         with station:
             paparazzi.send(heartbeat(station, autopilot=8, kind=6))
@@ -277,7 +276,7 @@ def test_strangers_at_our_own_address_do_not_keep_the_vehicle_out() -> None:
     with (
         FakeVehicleEndpoint(ARDUPILOTMEGA, system=1) as vehicle,
         FakeVehicleEndpoint(ARDUPILOTMEGA, system=9) as stranger,
-        Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1) as link,
+        closing(Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1)) as link,
     ):
         stranger.ground = vehicle.ground
         stranger.beat()
@@ -323,7 +322,7 @@ def test_a_newer_message_is_not_handed_over_yet_counts_in_the_sequence() -> None
     """PX4 sends ids unknown to the dialect. Their checksums cannot be verified, so they are no sign of life."""
     with (
         FakeVehicleEndpoint(COMMON, system=1) as vehicle,
-        Link(vehicle.address, COMMON, clock=CLOCK, target_system=1) as link,
+        closing(Link(vehicle.address, COMMON, clock=CLOCK, target_system=1)) as link,
     ):
         vehicle.beat()
         assert len(collect(link, 1)) == 1
@@ -400,7 +399,7 @@ def test_a_frame_of_mavlink_2_is_never_sent_to_paparazzi(paparazzi: FakeVehicleE
 def test_others_are_sent_mavlink_2(dialect: Dialect) -> None:
     with (
         FakeVehicleEndpoint(dialect, system=1) as vehicle,
-        Link(vehicle.address, dialect, clock=CLOCK, target_system=1) as link,
+        closing(Link(vehicle.address, dialect, clock=CLOCK, target_system=1)) as link,
     ):
         link.send("PARAM_SET", **GAIN)
         assert vehicle.hear()
@@ -489,7 +488,7 @@ def tapped(dialect: Dialect, system: int) -> Iterator[Tapped]:
     clock = ManualClock()
     with (
         FakeVehicleEndpoint(dialect, system=system) as vehicle,
-        Link(vehicle.address, dialect, clock=clock, target_system=system) as link,
+        closing(Link(vehicle.address, dialect, clock=clock, target_system=system)) as link,
     ):
         yield Tapped(vehicle, clock, link)
 
@@ -573,7 +572,7 @@ def test_a_link_whose_thread_fails_reports_it_to_all_users(
     reported: list[str] = []
     monkeypatch.setattr(threading, "excepthook", lambda failure: reported.append(str(failure.exc_value)))
     clock = BrokenClock()
-    with Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link:
+    with closing(Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31)) as link:
         clock.is_broken = True
         paparazzi.say("LOCAL_POSITION_NED", **position(20))
         with pytest.raises(LinkError, match=r"failed: the clock is broken\."):
@@ -590,7 +589,7 @@ def test_a_link_over_tcp_outlives_the_connection() -> None:
     with (
         socket.create_server((LOOPBACK, 0)) as server,
         FakeVehicleEndpoint(COMMON, system=1) as vehicle,
-        Link(TcpAddress(LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK) as link,
+        closing(Link(TcpAddress(LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK)) as link,
     ):
         server.settimeout(Waits.at_most_s)
         for _ in range(2):
@@ -611,7 +610,7 @@ def test_a_link_over_a_serial_line() -> None:
     tty.setraw(our_end)
     with (
         FakeVehicleEndpoint(ARDUPILOTMEGA, system=1) as vehicle,
-        Link(SerialAddress(os.ttyname(our_end), 57600), ARDUPILOTMEGA, clock=CLOCK) as link,
+        closing(Link(SerialAddress(os.ttyname(our_end), 57600), ARDUPILOTMEGA, clock=CLOCK)) as link,
     ):
         os.write(vehicle_end, b"\x00\x55" + heartbeat(vehicle))
         assert [each.message.get_srcSystem() for each in collect(link, 1)] == [1]
@@ -632,8 +631,7 @@ def kinds_heard(vehicle: FakeVehicleEndpoint, descriptor: int) -> list[str]:
 def test_a_folder_that_is_not_there_leaves_nothing_open(paparazzi: FakeVehicleEndpoint, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="telemetry log"):
         Link(paparazzi.address, PAPARAZZI, clock=CLOCK, tlog=tmp_path / "none" / "flight.tlog")
-    with Link(paparazzi.address, PAPARAZZI, clock=CLOCK):
-        pass  # the port is free again
+    Link(paparazzi.address, PAPARAZZI, clock=CLOCK).close()  # the port is free again
 
 
 def test_a_stream_that_is_always_cut_within_a_frame_takes_no_more_memory() -> None:

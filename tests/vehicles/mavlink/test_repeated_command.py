@@ -12,7 +12,7 @@ from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.radio import AutopilotLink
-from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.sent_commands import RepeatedCommand
 from tests.clocks import SimulatedClock
 
 GUIDED, STABILIZE, LAND, BRAKE = "4", "0", "9", "17"

@@ -3,6 +3,7 @@
 import os
 import resource
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,7 @@ def test_both_directions_are_read_back_in_order_with_their_times(
     path = tmp_path / "flight.tlog"
     started_s = time.time()
     with FakeVehicleEndpoint(dialect) as vehicle:
-        with Link(vehicle.address, dialect, clock=ScaledClock(), target_system=31, tlog=path) as link:
+        with closing(Link(vehicle.address, dialect, clock=ScaledClock(), target_system=31, tlog=path)) as link:
             for step in range(200):
                 vehicle.say("LOCAL_POSITION_NED", **position(20 * step, z=-0.5))
             assert len(collect(link, 200)) == 200
@@ -73,7 +74,7 @@ def test_what_was_dropped_is_not_in_the_log(tmp_path: Path, monkeypatch: pytest.
     path = tmp_path / "flight.tlog"
     with FakeVehicleEndpoint(PAPARAZZI) as vehicle:
         other = PAPARAZZI.codec(system=7, component=1)
-        with Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=path) as link:
+        with closing(Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=path)) as link:
             vehicle.send(other.pack(PAPARAZZI.message("LOCAL_POSITION_NED", position(20))) + b"noise")
             vehicle.say("LOCAL_POSITION_NED", **position(40))
             assert len(collect(link, 1)) == 1
@@ -86,7 +87,7 @@ def test_a_log_runs_in_vehicle_time(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     heard = []
     with (
         FakeVehicleEndpoint(PAPARAZZI) as vehicle,
-        Link(vehicle.address, PAPARAZZI, clock=clock, target_system=31, tlog=path) as link,
+        closing(Link(vehicle.address, PAPARAZZI, clock=clock, target_system=31, tlog=path)) as link,
     ):
         for step in range(2):
             vehicle.say("LOCAL_POSITION_NED", **position(step))
@@ -163,7 +164,9 @@ def test_what_a_full_disk_did_not_take_is_stored_when_there_is_room(
 def test_a_full_disk_is_reported_and_does_not_end_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
     with (
         FakeVehicleEndpoint(PAPARAZZI) as vehicle,
-        Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=Path("/dev/full")) as link,
+        closing(
+            Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=Path("/dev/full"))
+        ) as link,
     ):
         for step in range(3):
             vehicle.say("LOCAL_POSITION_NED", **position(step))

@@ -13,10 +13,10 @@ from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import LinkError
+from app.vehicles.mavlink_kind import open_source
 from app.vehicles.mocap import odometry
 from app.vehicles.mocap.addresses import StreamAddress
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource
-from app.vehicles.mocap.opening import open_source
 from tests.ports import free_port
 from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, news
 from tests.waiting import eventually

@@ -12,7 +12,7 @@ import pytest
 from app.autopilots.registry import AUTOPILOTS
 from app.vehicles import mavlink_kind
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, OptionValue, Vehicle, VehicleError
-from app.vehicles.mavlink import opening
+from app.vehicles.mavlink import radio
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle
@@ -34,7 +34,7 @@ ORDER = FlightOptions(seed=1, window_s=RECORD_S - RECORDED_BEYOND_S)
 def generic_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that differs from PX4 is the make in the heartbeat."""
     generic = replace(AUTOPILOTS["px4"], autopilot=MAKE)
-    monkeypatch.setattr(opening, "AUTOPILOTS", {**AUTOPILOTS, "px4": generic})
+    monkeypatch.setattr(radio, "AUTOPILOTS", {**AUTOPILOTS, "px4": generic})
 
 
 @pytest.fixture(autouse=True)

@@ -1,15 +1,22 @@
-"""Detection of two vehicles that use the same system id.
+"""What is found out from the packets of a link: its statistics, and whether two vehicles use the same system id.
 
 Two vehicles that send at the same time use every sequence number twice, with different contents, each going on where
 it was, and report two times. Packets that are repeated, late or out of order do neither; a vehicle that restarts uses
 numbers again, but does not go on with the former ones. Copies of packets, however late, are no evidence.
+
+Another sender with the ids of the vehicle is the vehicle itself from another port, a second vehicle, or a source of
+copies of its packets. A single packet of it says nothing, and a copy of one already received never does.
 """
 
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
+from app.vehicles.mavlink.transports import Peer
+
 NUMBERS: Final = 256
+MAX_SEQUENCE_LEAD: Final = 128
+"""A sequence number further ahead than this is an old one, because packets may overtake each other."""
 WITHIN_S: Final = 2.0
 PIECES: Final = 6
 """Pieces of evidence within `WITHIN_S` that make a duplicate certain."""
@@ -33,6 +40,63 @@ _SEQUENCES: Final = 8
 _REMEMBERED_FRAMES_S: Final = 5.0
 """Longer than a copy is late, shorter than the same frame takes to be sent again."""
 
+INTERVAL_S: Final = 0.2
+"""Interval at which a datagram of another peer is parsed while the vehicle is received, so that a flood of them costs
+nothing."""
+GONE_AFTER_S: Final = 1.5
+"""A peer that has sent nothing for this long may have moved to another port of the same host."""
+MOVED_AFTER_S: Final = 0.3
+"""The same, if the numbers of its packets go on at that port."""
+_MOST_PEERS: Final = 32
+"""Greatest number of other peers of which a datagram is parsed in the interval."""
+_PEERS_PACKETS: Final = 3
+"""Packets of another peer that are evidence of a second vehicle."""
+_PEERS_WITHIN_S: Final = 3.0
+_PEERS_LOST: Final = 64
+"""The numbers of a vehicle's packets go on at another port if fewer than this are missing."""
+_PEERS_REMEMBERED_S: Final = 3.0
+"""Time for which such evidence counts."""
+
+
+@dataclass(slots=True)
+class LinkHealth:
+    """Statistics of a link; times in seconds of the link's clock."""
+
+    received: int = 0
+    """Messages of the vehicle that the dialect knows."""
+    lost: int = 0
+    """Messages missing by the vehicle's sequence numbers."""
+    bad: int = 0
+    """Sections of bad data: wrong checksums, wrong signatures."""
+    foreign: int = 0
+    """Datagrams of other senders and messages of other systems, all dropped."""
+    overrun: int = 0
+    """Messages dropped because `receive` was not called."""
+    sent: int = 0
+    unsent: int = 0
+    """Messages that could not be sent: no peer yet, no connection, full buffer."""
+    last_packet_s: float | None = None
+    last_heartbeat_s: float | None = None
+
+
+class LossCounter:
+    """Counts missing messages by the sequence numbers of each component."""
+
+    def __init__(self, uncounted: tuple[str, ...]) -> None:
+        """`uncounted` are the prefixes of the names of messages with a separate sequence counter."""
+        self._uncounted = uncounted
+        self._latest: dict[int, int] = {}
+        self.lost = 0
+
+    def count(self, kind: str, component: int, number: int) -> None:
+        """Count a message by its sequence number, 0 to 255; late and repeated messages are ignored."""
+        if kind.startswith(self._uncounted):
+            return
+        ahead = (number - self._latest.get(component, number - 1)) % NUMBERS
+        if 0 < ahead < MAX_SEQUENCE_LEAD:
+            self.lost += ahead - 1
+            self._latest[component] = number
+
 
 @dataclass(slots=True)
 class _Used:
@@ -40,8 +104,17 @@ class _Used:
     count: int
 
 
+@dataclass(slots=True)
+class _Other:
+    first_s: float
+    last_s: float
+    number: int
+    packets: int = 0
+
+
 class DuplicateDetector:
-    """Detector for the messages of one component, in the order of receipt."""
+    """Detector for the messages of one component, in the order of receipt, and for those of other peers than the
+    vehicle's with its ids."""
 
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
@@ -58,10 +131,15 @@ class DuplicateDetector:
         self._clock_changes: deque[float] = deque()
         self._certain_s: float | None = None
         self._why = ""
+        self._last_number = 0
+        self._checked_s: dict[Peer, float] = {}
+        self._others: dict[Peer, _Other] = {}
+        self._other_s = float("-inf")
 
     def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None, *, is_counted: bool = True) -> bool:
         """Add a message by its whole frame and sequence number, which counts unless the message has another counter;
         `boot_s` is its time stamp, if it has one. Return whether it is a copy."""
+        self._last_number = number if is_counted else self._last_number
         while self._frames and now_s - self._frames[oldest := next(iter(self._frames))] > _REMEMBERED_FRAMES_S:
             del self._frames[oldest]
         is_copy = self._frames.pop(frame, None) is not None
@@ -72,12 +150,36 @@ class DuplicateDetector:
             self._add_clock(boot_s - now_s, now_s)
         return False
 
+    def may_check(self, peer: Peer, now_s: float) -> bool:
+        """Whether to parse a datagram of another peer now. Each has its own interval, so that one does not hide
+        another."""
+        recent_s = {each: at_s for each, at_s in self._checked_s.items() if now_s - at_s < INTERVAL_S}
+        if peer in recent_s or len(recent_s) >= _MOST_PEERS:
+            return False
+        self._checked_s = {**recent_s, peer: now_s}
+        return True
+
+    def add_other(self, peer: Peer, number: int, now_s: float, *, last_s: float) -> bool:
+        """Add a packet of another peer with the vehicle's ids that is no copy; `last_s` is the time of the vehicle's
+        last. Return whether the vehicle has moved there."""
+        self._others = {each: other for each, other in self._others.items() if now_s - other.last_s < _PEERS_WITHIN_S}
+        other = self._others.setdefault(peer, _Other(now_s, now_s, number))
+        other.last_s, other.packets = now_s, other.packets + 1
+        if other.first_s > last_s:
+            goes_on = 0 < (other.number - self._last_number) % NUMBERS < _PEERS_LOST
+            return goes_on and other.packets > 1 and now_s - last_s > MOVED_AFTER_S
+        if other.packets >= _PEERS_PACKETS:
+            self._other_s = now_s
+        return False
+
     def has_seen(self, frame: bytes) -> bool:
         """Whether a message is a copy of a recent one."""
         return frame in self._frames
 
     def reason(self, now_s: float) -> str:
         """Return the evidence for two vehicles; empty without evidence."""
+        if now_s - self._other_s < _PEERS_REMEMBERED_S:
+            return "Another vehicle with the same system id sends from another address."
         if self._is_certain(self._repeated_numbers, now_s):
             self._certain_s, self._why = now_s, "Its sequence numbers are repeated with different contents."
         elif self._is_certain(self._clock_changes, now_s):

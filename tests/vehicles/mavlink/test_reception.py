@@ -6,7 +6,7 @@ from itertools import chain
 
 import pytest
 
-from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
+from app.vehicles.mavlink.reception import DuplicateDetector
 
 Packet = tuple[float, int, bytes, float]
 """Time of arrival, sequence number, frame, and the vehicle's time in it."""

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from app.vehicles.mocap.stream import ClockOffset, PoseStream
+from app.vehicles.mavlink.altitude_sources import AltitudeSource, ClockOffset, Pose
 
 
-def put(stream: PoseStream, time_s: float, altitude_m: float, *, arrived_s: float | None = None) -> None:
+def put(stream: AltitudeSource, time_s: float, altitude_m: float, *, arrived_s: float | None = None) -> None:
     arrived_s = time_s if arrived_s is None else arrived_s
-    stream.put(altitude_m, (altitude_m,), time_s=time_s, arrived_s=arrived_s, tracking_valid=True)
+    stream.put(Pose(time_s, altitude_m, (altitude_m,), tracking_valid=True), arrived_s)
 
 
 def test_a_frame_that_was_held_up_is_dated_as_if_it_had_not_been() -> None:
@@ -38,7 +38,7 @@ def test_a_source_that_starts_anew_is_dated_by_its_new_clock() -> None:
 
 
 def test_late_packets_and_repeated_frames_say_nothing_new() -> None:
-    stream = PoseStream()
+    stream = AltitudeSource("a stream")
     for time_s, altitude_m in ((1.00, 0.10), (1.02, 0.12), (1.01, 0.11), (1.02, 0.12), (1.03, 0.13)):
         put(stream, time_s, altitude_m)
     assert [sample.advances for sample in stream.take()] == [True, True, False, False, True]
@@ -46,14 +46,14 @@ def test_late_packets_and_repeated_frames_say_nothing_new() -> None:
 
 
 def test_a_pose_that_comes_back_to_the_last_bit_is_stale_though_its_frames_advance() -> None:
-    stream = PoseStream()
+    stream = AltitudeSource("a stream")
     for time_s, altitude_m in ((1.00, 0.10), (1.01, 0.11), (1.02, 0.11), (1.03, 0.11), (1.04, 0.12)):
         put(stream, time_s, altitude_m)
     assert [sample.advances for sample in stream.take()] == [True, True, False, False, True]
 
 
 def test_a_source_that_was_switched_off_and_on_advances_again() -> None:
-    stream = PoseStream()
+    stream = AltitudeSource("a stream")
     put(stream, 900.0, 0.1, arrived_s=5.0)
     put(stream, 0.01, 0.2, arrived_s=25.0)
     assert [(sample.measured_s, sample.advances) for sample in stream.take()] == [(5.0, True), (25.0, True)]
@@ -64,22 +64,22 @@ NAN, INF = float("nan"), float("inf")
 
 @pytest.mark.parametrize("altitude_m", [NAN, INF, -INF])
 def test_an_altitude_that_is_no_number_is_a_body_that_is_not_seen(altitude_m: float) -> None:
-    stream = PoseStream()
+    stream = AltitudeSource("a stream")
     put(stream, 1.00, 0.10)
     put(stream, 1.01, altitude_m)
     assert [sample.tracking_valid for sample in stream.take()] == [True, False]
 
 
 def test_a_frozen_pose_is_stale_though_some_of_its_numbers_are_missing() -> None:
-    stream = PoseStream()
+    stream = AltitudeSource("a stream")
     for time_s in (1.00, 1.01, 1.02):
-        stream.put(0.1, (0.1, float("nan")), time_s=time_s, arrived_s=time_s, tracking_valid=True)
+        stream.put(Pose(time_s, 0.1, (0.1, float("nan")), tracking_valid=True), time_s)
     assert [sample.advances for sample in stream.take()] == [True, False, False]
 
 
 @pytest.mark.parametrize("time_s", [NAN, INF])
 def test_a_time_that_is_not_a_number_is_ignored(time_s: float) -> None:
-    stream = PoseStream()
+    stream = AltitudeSource("a stream")
     put(stream, 1.00, 0.10)
     put(stream, time_s, 0.11, arrived_s=1.01)
     put(stream, 1.02, 0.12)
