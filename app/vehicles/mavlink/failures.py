@@ -86,6 +86,8 @@ HEARTBEATS_MISSED: Final = 3.5
 """Heartbeat periods without a heartbeat after which the vehicle counts as lost."""
 GROUND_M: Final = 0.15
 """Height below which a vehicle may be standing on the ground."""
+DRIFT_M: Final = 1.0
+"""Greatest drift of an altitude during a flight."""
 REPEAT_S: Final = 1.0
 """Interval at which a command is repeated until the vehicle responds."""
 _LAND_REPEATED_S: Final = 5.0

@@ -11,7 +11,7 @@ from app.core.experiments.step_sequence import REFERENCE
 from app.core.models.set_points import SetPoints, on_step
 from app.core.models.vertical_batch import reference_altitude
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.mavlink.monitors.set_points import SetPointChange
+from app.vehicles.mavlink.monitors.commanded import SetPointChange
 
 Reference = Callable[[SetPoints, Samples], Samples]
 """The autopilot's own reference for these set points, at these times."""

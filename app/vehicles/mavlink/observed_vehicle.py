@@ -14,10 +14,10 @@ from app.vehicles.end_texts import requested
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preparation
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
-from app.vehicles.mavlink.boot_clock import RESTARTED_S
 from app.vehicles.mavlink.command_sequence import set_up
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
+from app.vehicles.mavlink.monitors.clock import RESTARTED_S
 from app.vehicles.mavlink.opening import open_radio
 from app.vehicles.mavlink.parameters import GainStore
 from app.vehicles.mavlink.quarantine import Quarantine

@@ -22,8 +22,8 @@ from app.vehicles.base import (
     VehicleError,
 )
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
-from app.vehicles.mavlink.boot_clock import unwrapped
 from app.vehicles.mavlink.ground_observation import STANDS_WITHIN_M, GroundObservation, find_reception
+from app.vehicles.mavlink.monitors.clock import unwrapped
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.preparation import ARMED, LAND_FIRST, ONE_VEHICLE
 from app.vehicles.mavlink.radio import AutopilotLink

@@ -19,7 +19,7 @@ from app.vehicles.base import Ending, OptionValue
 from app.vehicles.flight_end import FlightEnd, GainsLeft
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.monitors.second_source import MAX_DIFFERENCE_M
+from app.vehicles.mavlink.monitors.altitude import MAX_DIFFERENCE_M
 from app.vehicles.mavlink.trial_state import State, Trial
 
 Scored = Literal["vehicle", "mocap"]

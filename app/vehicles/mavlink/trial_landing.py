@@ -13,9 +13,8 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     confirms_motors_off,
 )
-from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, land_every_s
-from app.vehicles.mavlink.monitors.positions import DRIFT_M
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.failures import DESCENDING_M_S, DRIFT_M, REPEAT_S, Failure, land_every_s
+from app.vehicles.mavlink.plan import replace
 from app.vehicles.mavlink.trial_findings import (
     find_change,
     find_taken_over,

@@ -22,13 +22,10 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
     StopRequested,
 )
-from app.vehicles.mavlink.failures import REPEAT_S, Failure, Finding
-from app.vehicles.mavlink.monitors.positions import DRIFT_M
-from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
-from app.vehicles.mavlink.monitors.settings import SettingMonitor
+from app.vehicles.mavlink.failures import DRIFT_M, REPEAT_S, Failure, Finding
+from app.vehicles.mavlink.monitors.commanded import SetPointMonitor, SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.plan import Plan, replace
 from app.vehicles.mavlink.trial_findings import allowed_modes
 from app.vehicles.mavlink.trial_phases import HANDLERS
 from app.vehicles.mavlink.trial_reactions import fail, measure_ground, note, note_cause, stop_motors

@@ -16,10 +16,9 @@ from app.vehicles.mavlink.events import (
     SetPointsPaused,
     WithdrawSetPoint,
 )
-from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.monitors.positions import DRIFT_M
+from app.vehicles.mavlink.failures import DRIFT_M, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.plan import replace
 from app.vehicles.mavlink.trial_findings import (
     MODE_KNOWN_S,
     find_in_flight,

@@ -14,7 +14,7 @@ from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GAIN_FAILURES, GROUND_M, RESPONSES, Failure, Finding, Reaction
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.plan import replace
 from app.vehicles.mavlink.trial_state import TRANSITIONS, SafeGainsSent, State, Step, Trial
 
 GAIN_S: Final = 0.1

@@ -11,8 +11,7 @@ from app.vehicles.end_texts import joined, request_text
 from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink.events import Command
 from app.vehicles.mavlink.failures import RESPONSES, Failure, Outcome
-from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
-from app.vehicles.mavlink.monitors.settings import SettingMonitor
+from app.vehicles.mavlink.monitors.commanded import SetPointMonitor, SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 

@@ -9,9 +9,9 @@ import pytest
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Parameter, Position
 from app.autopilots.registry import AUTOPILOTS
-from app.vehicles.mavlink.boot_clock import OtherClock
 from app.vehicles.mavlink.events import ActionDone, ActionRefused, SetPointsPaused
 from app.vehicles.mavlink.failures import Finding
+from app.vehicles.mavlink.monitors.clock import OtherClock
 from app.vehicles.mavlink.monitors.modes import ModeMonitor
 from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink import test_trial_machine as befall

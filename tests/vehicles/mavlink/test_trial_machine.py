@@ -20,7 +20,6 @@ from app.autopilots.measurements import (
 )
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     ActionDone,
     ActionRefused,
@@ -33,6 +32,7 @@ from app.vehicles.mavlink.events import (
     StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.monitors.clock import WRAP_S
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import begin
 from app.vehicles.mavlink.trial_state import State

@@ -19,7 +19,6 @@ from app.autopilots.measurements import (
 )
 from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     ActionDone,
     Command,
@@ -32,6 +31,7 @@ from app.vehicles.mavlink.events import (
     SendGain,
     Tick,
 )
+from app.vehicles.mavlink.monitors.clock import WRAP_S
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import advance, begin
 from app.vehicles.mavlink.trial_state import State, Trial

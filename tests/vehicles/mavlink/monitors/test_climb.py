@@ -3,7 +3,7 @@ from itertools import pairwise
 import pytest
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.monitors.climb import ClimbMonitor
+from app.vehicles.mavlink.monitors.ground import ClimbMonitor
 from tests.vehicles.mavlink.monitors.observing import failure_of
 
 

@@ -1,7 +1,7 @@
 import pytest
 
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
-from app.vehicles.mavlink.monitors.second_source import SecondSourceMonitor
+from app.vehicles.mavlink.monitors.altitude import SecondSourceMonitor
 from tests.vehicles.mavlink.monitors.observing import failure_of
 from tests.vehicles.mavlink.walking import PLAN
 
