@@ -18,6 +18,10 @@ Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
 is unusable. quarantine: as invalid, and the vehicle's state is uncertain."""
 
 Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land", "repeat land", "cease", "note"]
+"""land, gains first: the gains are suspect, and the safe gains are sent before Land. A vehicle that lifts off late,
+with its integrator wound up, is treated in the same way. One that has not settled may ring, and would land for seconds
+on these gains, but may also drift, or be moved by its estimator or the wind: the flight is invalid, and does not count
+against the gains, unless it exceeds a limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +73,6 @@ class Finding:
     failure: Failure
     why: str = ""
     request: StopRequest | None = None
-
-
-GAIN_FAILURES: Final = frozenset(
-    {failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"}
-)
-"""Failures in which the gains are suspect: the safe gains are sent before Land. A vehicle that lifts off late, with its
-integrator wound up, is treated in the same way. One that has not settled may ring, and would land for seconds on these
-gains, but may also drift, or be moved by its estimator or the wind: the flight is invalid, and does not count against
-the gains, unless it exceeds a limit."""
 
 
 CONFIRMATION_PERIODS: Final = 1.05

@@ -23,12 +23,10 @@ from app.vehicles.mavlink.events import (
     StopRequested,
 )
 from app.vehicles.mavlink.failures import DRIFT_M, REPEAT_S, Failure, Finding
-from app.vehicles.mavlink.monitors.commanded import SetPointMonitor, SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan, replace
-from app.vehicles.mavlink.trial_findings import allowed_modes
 from app.vehicles.mavlink.trial_phases import HANDLERS
-from app.vehicles.mavlink.trial_reactions import fail, measure_ground, note, note_cause, stop_motors
+from app.vehicles.mavlink.trial_reactions import allowed_modes, fail, measure_ground, note, note_cause, stop_motors
 from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, State, Step, Trial
 
 _REPLY_S: Final = 0.5
@@ -45,9 +43,7 @@ _RECORDED: Final = STATES_WITH_TRIAL_GAINS | {State.ARM, State.ABORT_LAND, State
 
 def begin(plan: Plan, watch: TrialObservation, now_s: float) -> Step:
     """Begin the trial of a vehicle that stands disarmed on the ground with its gains confirmed: command it to arm."""
-    settings, set_points = SettingMonitor(), SetPointMonitor()
-    trial = Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch, settings=settings, set_points=set_points)
-    return trial, (PerformAction(Action.ARM),)
+    return Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch), (PerformAction(Action.ARM),)
 
 
 def advance(trial: Trial, event: Event) -> Step:
@@ -106,7 +102,7 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     if trial.state is State.ARM:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
     elif trial.state is State.RECORD:
-        trial = set_point_schedule.note_settling(trial, positions) if positions else trial
+        trial = set_point_schedule.note_settling(trial, positions)
         trial = _with_target(trial, event) if trial.plan.holds_first else trial
     to_m = trial.plan.ground_m if trial.state not in STATES_WITH_TRIAL_GAINS else trial.plan.set_point_m
     samples = (RecordSample(each, to_m, watch.battery.voltage_v, watch.second.altitude_m) for each in positions)
@@ -118,18 +114,15 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
     so for the first time."""
     if not isinstance(measurement, Parameter) or trial.state not in {State.ARM, *STATES_WITH_TRIAL_GAINS}:
         return trial, ()
-    suspects = trial.settings.suspects
     settings, finding = trial.settings.update(measurement, trial.plan)
-    trial = replace(trial, settings=settings)
-    is_new = len(settings.suspects) > len(suspects)
-    return trial if finding is None else note(trial, finding), (RequestGain(measurement.name),) if is_new else ()
+    is_new = len(settings.suspects) > len(trial.settings.suspects)
+    return note(replace(trial, settings=settings), finding), (RequestGain(measurement.name),) if is_new else ()
 
 
 def _with_target(trial: Trial, event: PacketReceived) -> Trial:
     """Note that the vehicle follows another set point than it was commanded to."""
     set_points, finding = trial.set_points.update(event.measurement, event.now_s, trial.plan)
-    trial = trial if set_points is trial.set_points else replace(trial, set_points=set_points)
-    return trial if finding is None else note(trial, finding)
+    return note(replace(trial, set_points=set_points), finding)
 
 
 def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -> Trial:
@@ -146,8 +139,7 @@ def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
     is_unchanged = watch.modes is trial.watch.modes
     if is_unchanged or trial.state not in STATES_WITH_TRIAL_GAINS or not allowed_modes(trial):
         return trial
-    finding = watch.modes.find_interruption(trial.watch.modes, trial.plan)
-    return trial if finding is None else note(trial, finding)
+    return note(trial, watch.modes.find_interruption(trial.watch.modes, trial.plan))
 
 
 def _with_fall(trial: Trial, now_s: float) -> Trial:
@@ -179,10 +171,8 @@ def _with_drift(trial: Trial, now_s: float) -> Trial:
     watch, plan = trial.watch, trial.plan
     is_told_to_land = trial.state not in STATES_WITH_TRIAL_GAINS
     has_landed = is_told_to_land and watching.has_reported_landing(watch, now_s, plan)
-    drift = watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed)
-    trial = trial if drift is None else note_cause(trial, drift)
-    contradiction = watch.ground.find_contradiction(now_s)
-    return trial if contradiction is None else note(trial, contradiction)
+    trial = note_cause(trial, watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed))
+    return note(trial, watch.ground.find_contradiction(now_s))
 
 
 def _with_jump(trial: Trial) -> Trial:

@@ -19,18 +19,16 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import DRIFT_M, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import replace
-from app.vehicles.mavlink.trial_findings import (
+from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
+from app.vehicles.mavlink.trial_reactions import (
     MODE_KNOWN_S,
+    enter,
+    fail,
     find_in_flight,
     find_noted,
     is_by_hand,
-    may_be_by_hand,
-)
-from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
-from app.vehicles.mavlink.trial_reactions import (
-    enter,
-    fail,
     land,
+    may_be_by_hand,
     measure_ground,
     note,
 )
@@ -55,11 +53,12 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, arm_sent_s=now_s)
     if trial.watch.modes.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
-    if isinstance(event, ActionRefused):
-        return fail(measure_ground(trial, now_s), Finding(Failure.NOT_ARMED, event.why), now_s)
-    if finding := find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED):
-        return fail(measure_ground(trial, now_s), finding, now_s)
-    if finding := watching.find_on_ground(trial.watch, trial.plan, now_s) or _not_armed(trial, event):
+    if finding := (
+        (Finding(Failure.NOT_ARMED, event.why) if isinstance(event, ActionRefused) else None)
+        or find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED)
+        or watching.find_on_ground(trial.watch, trial.plan, now_s)
+        or _not_armed(trial, event)
+    ):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S or last is None:
@@ -155,8 +154,8 @@ def _record(trial: Trial, event: Event) -> Step:
         trial.settings.find_unconfirmed() or watch.climb.find_sunken(watch.last, lowest_m, plan.ground_m),
         watch.climb.find_incomplete(plan.climb_to_m) if plan.autopilot.climbs_from_ground else None,
     ):
-        trial = trial if finding is None else note(trial, finding)
-    return land(trial, State.LAND, now_s)
+        trial = note(trial, finding)
+    return land(trial, now_s, State.LAND)
 
 
 def _may_have_stayed(trial: Trial, now_s: float) -> bool:
@@ -176,7 +175,7 @@ def _withdraw(trial: Trial, now_s: float) -> Step:
     if is_by_hand(trial):
         return trial, ()
     why = "A heartbeat reported a manual mode, so that no further set point was commanded."
-    return land(note(trial, Finding(Failure.INTERRUPTED, why)), State.ABORT_LAND, now_s)
+    return land(note(trial, Finding(Failure.INTERRUPTED, why)), now_s)
 
 
 def _change_set_point(trial: Trial, event: Event) -> Step | None:
@@ -193,7 +192,7 @@ def _change_set_point(trial: Trial, event: Event) -> Step | None:
     if not set_point_schedule.is_due(trial, now_s) or may_be_by_hand(trial, now_s):
         return (trial, ()) if is_confirmed else None
     if trial.failure is not None:
-        return land(trial, State.ABORT_LAND, now_s)
+        return land(trial, now_s)
     finding = set_point_schedule.find_unsettled(trial)
     return set_point_schedule.command_next(trial) if finding is None else fail(trial, finding, now_s)
 

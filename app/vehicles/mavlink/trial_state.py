@@ -1,7 +1,7 @@
 """State of one trial on a MAVLink vehicle: its states, and what is known of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
@@ -119,8 +119,8 @@ class Trial:
     state: State
     since_s: float
     watch: TrialObservation
-    settings: SettingMonitor
-    set_points: SetPointMonitor
+    settings: SettingMonitor = field(default_factory=SettingMonitor)
+    set_points: SetPointMonitor = field(default_factory=SetPointMonitor)
     failure: Failure | None = None
     request: StopRequest | None = None
     remarks: tuple[str, ...] = ()
