@@ -7,11 +7,11 @@ from app.vehicles.base import CheckItem, FlightOptions
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preflight
 from app.vehicles.mavlink.command_sequence import set_up
-from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference
 from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.parameters import GainStore
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.records import Reference, simulate_reference
 from app.vehicles.mavlink.set_point_schedule import with_hold
 
 

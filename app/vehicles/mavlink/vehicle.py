@@ -17,10 +17,9 @@ from app.vehicles.mavlink.connection import VehicleConnection
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flight_preparation import flies_steps
-from app.vehicles.mavlink.flown_set_points import Reference, with_flown_set_points
 from app.vehicles.mavlink.ground_observation import GroundObservation
 from app.vehicles.mavlink.parameters import written
-from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
+from app.vehicles.mavlink.records import AlignedRecord, Reference, Scored, add_secondary_altitude, with_flown_set_points
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from app.vehicles.mavlink.set_point_schedule import referred_from_s
 from app.vehicles.mavlink.transports import LinkError
