@@ -75,8 +75,6 @@ class LoopReports:
                 self.altitude_error_m, self.altitude_error_s = error_m, now_s
             case TargetAltitude(altitude_m=altitude_m):
                 self.target_m, self.target_s = altitude_m, now_s
-            case _:
-                pass
 
 
 class RestartCounter:
@@ -188,8 +186,6 @@ class VehicleMemory:
                 self.has_ground_reference &= self.restarts == before
             case StatusText():
                 self._add_chunk(measurement, now_s)
-            case _:
-                pass
 
     def _add_chunk(self, chunk: StatusText, now_s: float) -> None:
         """Assemble the chunks of a status text in order; a lost chunk is not waited for."""

@@ -23,7 +23,7 @@ from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Finding
 from app.vehicles.mavlink.monitors.altitude import PositionMonitor, SecondSourceMonitor
 from app.vehicles.mavlink.monitors.clock import ATTENDED_S, ClockMonitor, LinkMonitor, unwrapped
-from app.vehicles.mavlink.monitors.ground import AGREED_S, ClimbMonitor, GroundMonitor
+from app.vehicles.mavlink.monitors.ground import AGREED_S, STANDS_S, ClimbMonitor, GroundMonitor
 from app.vehicles.mavlink.monitors.limits import BatteryMonitor, EnvelopeMonitor
 from app.vehicles.mavlink.monitors.modes import IdentityMonitor, ModeMonitor
 from app.vehicles.mavlink.plan import Plan, replace
@@ -128,8 +128,6 @@ def update(
         case BlockEntered(number=number):
             block = plan.blocks.get(number, str(number))
             watch = replace(watch, modes=replace(watch.modes, block=block, block_s=now_s))
-        case _:
-            pass
     return watch, ()
 
 
@@ -192,7 +190,7 @@ def settle(watch: TrialObservation, now_s: float, plan: Plan, *, commanded: bool
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """Whether its own landed state or the second source shows it in the air, independent of its altitude."""
     second_m = watch.second.altitude_at(now_s)
-    return watch.ground.reports_flight(now_s) or (second_m is not None and second_m - ground_m > GROUND_M)
+    return watch.ground.reports(now_s, landed=False) or (second_m is not None and second_m - ground_m > GROUND_M)
 
 
 def has_reported_landing(watch: TrialObservation, now_s: float, plan: Plan) -> bool:
@@ -208,7 +206,8 @@ def stands_by_own_account(watch: TrialObservation, now_s: float, plan: Plan) -> 
     last = watch.last
     stays = last is None or abs(last.altitude_m - plan.ground_m) <= DRIFT_M
     stays = stays and (last is None or abs(last.climb_rate_m_s) <= _DRIFT_M_S)
-    return stays and (watch.ground.reported_standing(now_s) or watch.modes.block in plan.autopilot.arming_blocks)
+    stands = watch.ground.reports(now_s, landed=True, within_s=STANDS_S)
+    return stays and (stands or watch.modes.block in plan.autopilot.arming_blocks)
 
 
 def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:

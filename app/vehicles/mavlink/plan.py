@@ -29,6 +29,13 @@ else:
         return successor
 
 
+def since(before_s: float | None, now_s: float, *, holds: bool) -> float | None:
+    """Return since when something `holds` that has held since `before_s`; None if it does not hold."""
+    if not holds:
+        return None
+    return now_s if before_s is None else before_s
+
+
 __all__ = ["replace"]
 
 RECORD_S: Final = WINDOW_S + RECORDED_BEYOND_S

@@ -131,15 +131,13 @@ def _on_the_second_s_times(trajectory: Trajectory, second_s: Samples, second_m: 
 
 
 SOURCE: Final = "mavlink"
-_SCORED: Final = "altitude_m"
-_OTHER: Final = "altitude_2_m"
 
 
 def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[str, float]:
     """Return a sample's channels; altitudes count from `datum_m` on the vehicle's own datum."""
     own_m = sample.position.altitude_m - datum_m
     channels = {
-        _SCORED: own_m,
+        "altitude_m": own_m,
         "climb_rate_m_s": sample.position.climb_rate_m_s,
         "set_point_m": sample.set_point_m - datum_m,
     }
@@ -152,7 +150,7 @@ def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[st
     if sample.second_m is not None:
         second_m = sample.second_m - datum_m
         scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)
-        channels |= {_SCORED: scored_m, _OTHER: other_m}
+        channels |= {"altitude_m": scored_m, "altitude_2_m": other_m}
     return channels
 
 

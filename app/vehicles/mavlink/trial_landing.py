@@ -14,7 +14,7 @@ from app.vehicles.mavlink.events import (
     confirms_motors_off,
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, DRIFT_M, REPEAT_S, Failure, land_every_s
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.plan import replace, since
 from app.vehicles.mavlink.trial_reactions import (
     abort,
     disarm,
@@ -94,9 +94,7 @@ def resting(trial: Trial, now_s: float) -> Trial:
         rests = trial.watch.ground.grounded_since_s is not None
     else:
         rests = trial.watch.positions.is_still(now_s, trial.plan.ground_m)
-    if rests is (trial.resting_since_s is not None):
-        return trial
-    return replace(trial, resting_since_s=now_s if rests else None)
+    return replace(trial, resting_since_s=since(trial.resting_since_s, now_s, holds=rests))
 
 
 def has_rested(trial: Trial, seconds: float, now_s: float) -> bool:

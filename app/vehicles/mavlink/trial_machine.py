@@ -129,7 +129,7 @@ def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -
     """Note the height of a vehicle in the air whose heartbeats begin to report that its motors are off."""
     if watch.modes.armed == trial.watch.modes.armed or trial.state not in _FLOWN:
         return trial
-    is_up = watch.positions.is_fresh(now_s) and not watch.ground.reports_landing(now_s)
+    is_up = watch.positions.is_fresh(now_s) and not watch.ground.reports(now_s, landed=True)
     height_m = watch.positions.height_m(trial.plan.ground_m) if is_up and not watch.modes.armed else None
     return replace(trial, disarmed_m=height_m or 0.0)
 

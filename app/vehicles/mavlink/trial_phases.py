@@ -162,7 +162,8 @@ def _may_have_stayed(trial: Trial, now_s: float) -> bool:
     """Whether its landed state has always been that it stands since the command, and its altitude has not been higher
     than one may shift as the motors start."""
     watch = trial.watch
-    stood = watch.ground.has_stood_since(now_s if trial.takeoff is None else trial.takeoff.at_s)
+    since_s = now_s if trial.takeoff is None else trial.takeoff.at_s
+    stood = watch.ground.landed is True and watch.ground.landed_since_s <= since_s
     return stood and watch.climb.highest_m - trial.plan.ground_m <= DRIFT_M
 
 

@@ -3,13 +3,13 @@ with their commands, as pure functions of a trial and the time. `trial_phases` d
 """
 
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import pairwise
 from typing import Final
 
 from app.autopilots.commands import Action
-from app.autopilots.measurements import Parameter, Position
+from app.autopilots.measurements import Parameter
 from app.vehicles.end_texts import request_text
 from app.vehicles.flight_end import Landing, StopRequest
 from app.vehicles.mavlink import observation as watching
@@ -141,7 +141,10 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
     is_in_place = stood[-1].away_m(watch.envelope.origin or stood[-1]) <= _IN_PLACE_M
     shift_m = statistics.median(altitudes_m) - plan.ground_m
     may_shift = plan.autopilot.climbs_from_ground or abs(shift_m) <= _SHIFT_M
-    if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
+    climbed_m = sum(
+        after.climb_rate_m_s * (after.time_boot_s - before.time_boot_s) for before, after in pairwise(samples)
+    )
+    if not (is_still and is_in_place and may_shift and abs(climbed_m) <= _CLIMBED_M):
         return trial
     return replace(
         trial,
@@ -150,11 +153,6 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
         ground_shift_m=shift_m,
         ground_samples=(),
     )
-
-
-def _climbed_m(samples: Sequence[Position]) -> float:
-    """Return the climb by climb rate alone, m."""
-    return sum(later.climb_rate_m_s * (later.time_boot_s - earlier.time_boot_s) for earlier, later in pairwise(samples))
 
 
 def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
@@ -242,7 +240,7 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     if trial.takeoff is None:
         return ""
     if landed_blocks or watch.ground.landed is not None:
-        has_landed = watch.modes.block in landed_blocks if landed_blocks else watch.ground.reports_landing(now_s)
+        has_landed = watch.modes.block in landed_blocks if landed_blocks else watch.ground.reports(now_s, landed=True)
         return "" if has_landed else "it has not reported a landing, and an altitude may drift"
     return "" if watch.climb.lifted and watch.climb.unseen_m is None else "its descent was not observed"
 

@@ -12,7 +12,7 @@ from app.autopilots.measurements import Position
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Failure, Finding
 from app.vehicles.mavlink.monitors.clock import ATTENDED_S, FRESH_S, LOST_S, SILENT_S, STUCK_S
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan, replace, since
 
 RESTING_M_S: Final = 0.1
 _JUMP_M: Final = 0.3
@@ -215,13 +215,12 @@ class SecondSourceMonitor:
         if not sample.is_new:
             return replace(second, blind_s=self.blind_s + min(max(now_s - before_s, 0.0), ATTENDED_S))
         apart_m = 0.0 if vehicle_m is None else abs(sample.altitude_m - vehicle_m)
-        since_s = self.apart_since_s if self.apart_since_s is not None else now_s
         return replace(
             second,
             altitude_m=sample.altitude_m,
             blind_s=0.0,
             apart_m=apart_m,
-            apart_since_s=since_s if apart_m > MAX_DIFFERENCE_M else None,
+            apart_since_s=since(self.apart_since_s, now_s, holds=apart_m > MAX_DIFFERENCE_M),
         )
 
     def altitude_at(self, now_s: float) -> float | None:

@@ -11,7 +11,7 @@ from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan, replace, since
 
 AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
@@ -109,13 +109,10 @@ class ClockMonitor:
 
     def advance(self, position: Position, now_s: float) -> "ClockMonitor":
         """Note a position that continues the clock: the least latency, and since when positions are late."""
-        offset_s, least_s, late_since_s = now_s - position.time_boot_s, self.least_offset_s, None
-        if least_s is None:
-            least_s = offset_s
-        else:
-            least_s = min(offset_s, least_s + DRIFT * (now_s - self.advanced_s))
-            if offset_s - least_s >= FRESH_S:
-                late_since_s = self.late_since_s if self.late_since_s is not None else now_s
+        offset_s = least_s = now_s - position.time_boot_s
+        if self.least_offset_s is not None:
+            least_s = min(offset_s, self.least_offset_s + DRIFT * (now_s - self.advanced_s))
+        late_since_s = since(self.late_since_s, now_s, holds=offset_s - least_s >= FRESH_S)
         return replace(self, advanced_s=now_s, stuck_s=0.0, least_offset_s=least_s, late_since_s=late_since_s)
 
     def sent_s(self, position: Position) -> float:

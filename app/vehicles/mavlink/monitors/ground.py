@@ -8,11 +8,11 @@ from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding
 from app.vehicles.mavlink.monitors.altitude import RESTING_M_S
 from app.vehicles.mavlink.monitors.clock import FRESH_S
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan, replace, since
 
 AGREED_S: Final = 1.0
 """Time for which every source must show the vehicle on the ground before its motors may be stopped."""
-_STANDS_S: Final = 3.0
+STANDS_S: Final = 3.0
 """Time for which the landed state of a vehicle that was not commanded to take off is believed."""
 _CONTRADICTED_S: Final = 8.0
 """Longer than an autopilot takes to detect its landing."""
@@ -42,32 +42,20 @@ class GroundMonitor:
 
     def settle(self, now_s: float, *, grounded: bool, said_to_fly: bool) -> "GroundMonitor":
         """Note whether its position shows it on the ground, and whether something else shows it in the air."""
-        grounded_s, contradicted_s = self.grounded_since_s, self.contradicted_since_s
-        grounded_s = (now_s if grounded_s is None else grounded_s) if grounded and not said_to_fly else None
-        contradicts = grounded and self.reports_flight(now_s)
-        contradicted_s = (now_s if contradicted_s is None else contradicted_s) if contradicts else None
+        grounded_s = since(self.grounded_since_s, now_s, holds=grounded and not said_to_fly)
+        contradicts = grounded and self.reports(now_s, landed=False)
+        contradicted_s = since(self.contradicted_since_s, now_s, holds=contradicts)
         if (grounded_s, contradicted_s) == (self.grounded_since_s, self.contradicted_since_s):
             return self
         return replace(self, grounded_since_s=grounded_s, contradicted_since_s=contradicted_s)
 
-    def reports_flight(self, now_s: float) -> bool:
-        return self.landed is False and now_s - self.landed_s < AGREED_S
-
-    def reports_landing(self, now_s: float) -> bool:
-        """Whether it now reports that it is on the ground."""
-        return self.landed is True and now_s - self.landed_s < AGREED_S
+    def reports(self, now_s: float, *, landed: bool, within_s: float = AGREED_S) -> bool:
+        """Whether its last landed state, of not long ago, is that it has `landed`, or that it flies."""
+        return self.landed is landed and now_s - self.landed_s < within_s
 
     def has_reported_landing(self, now_s: float) -> bool:
         """Whether it has reported for a second that it is on the ground."""
-        return self.reports_landing(now_s) and now_s - self.landed_since_s >= AGREED_S
-
-    def reported_standing(self, now_s: float) -> bool:
-        """Whether it has reported not long ago that it is on the ground."""
-        return self.landed is True and now_s - self.landed_s < _STANDS_S
-
-    def has_stood_since(self, since_s: float) -> bool:
-        """Whether its landed state has always been that it stands since then."""
-        return self.landed is True and self.landed_since_s <= since_s
+        return self.reports(now_s, landed=True) and now_s - self.landed_since_s >= AGREED_S
 
     def find_contradiction(self, now_s: float) -> Finding | None:
         """Find that a vehicle has reported for long that it flies while its altitude shows the ground."""

@@ -7,7 +7,7 @@ from typing import Final
 from app.autopilots.measurements import Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan, replace, since
 
 _CLIMB_RATE_M_S: Final = 4.0
 _CROSSING_M: Final = 0.3
@@ -89,9 +89,8 @@ class BatteryMonitor:
     low_since_s: float | None = None
 
     def update(self, voltage_v: float, now_s: float, plan: Plan) -> "BatteryMonitor":
-        since_s = self.low_since_s if self.low_since_s is not None else now_s
-        is_low = voltage_v < plan.min_battery_v
-        return replace(self, heard_s=now_s, voltage_v=voltage_v, low_since_s=since_s if is_low else None)
+        low_since_s = since(self.low_since_s, now_s, holds=voltage_v < plan.min_battery_v)
+        return replace(self, heard_s=now_s, voltage_v=voltage_v, low_since_s=low_since_s)
 
     def find(self, now_s: float) -> Finding | None:
         if self.low_since_s is not None and now_s - self.low_since_s > _LOW_VOLTAGE_S:
