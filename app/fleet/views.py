@@ -25,7 +25,7 @@ from app.db.pages import Order, page_of
 from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Vehicle, VehicleAct
-from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import end_text
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS
 

@@ -6,8 +6,7 @@ from app.campaigns import history
 from app.common.states import ActKind
 from app.db.models import FlightRow
 from app.fleet.control import record_act
-from app.vehicles.end_texts import request_text
-from app.vehicles.flight_end import StopRequest
+from app.vehicles.flight_end import StopRequest, request_text
 
 
 def record_flight_command(session: Session, flight: FlightRow, kind: ActKind, *, by: str, reason: str = "") -> None:

@@ -43,8 +43,7 @@ from app.flights.flight_commands import record_abort, record_flight_command
 from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
 from app.flights.schemas import TrialReadiness
 from app.live.hub import VehicleReport
-from app.vehicles.end_texts import unstaged_text
-from app.vehicles.flight_end import Landing, Requester, StopRequest, withdrawn_by
+from app.vehicles.flight_end import Landing, Requester, StopRequest, unstaged_text, withdrawn_by
 
 _NOT_LANDED: Final = frozenset({Landing.FELL, Landing.UNKNOWN})
 ReportOf = Callable[[int], VehicleReport]

@@ -26,8 +26,7 @@ from app.db.models import TrialPhotoRow
 from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
 from app.vehicles.base import Identity
-from app.vehicles.end_texts import cause_text
-from app.vehicles.flight_end import FlightEnd
+from app.vehicles.flight_end import FlightEnd, cause_text
 from app.vehicles.registry import VEHICLE_KINDS
 
 

@@ -10,7 +10,7 @@ from app.autopilots.commands import Action
 from app.core.clock import Clock
 from app.core.policy import Gains
 from app.vehicles.base import Identity, VehicleError
-from app.vehicles.end_texts import requested
+from app.vehicles.flight_end import requested
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preparation
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource

@@ -10,8 +10,7 @@ from typing import Final
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Parameter
-from app.vehicles.end_texts import request_text
-from app.vehicles.flight_end import Landing, StopRequest
+from app.vehicles.flight_end import Landing, StopRequest, request_text
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GROUND_M, RESPONSES, Failure, Finding, Reaction

@@ -7,8 +7,7 @@ from typing import Final
 
 from app.autopilots.commands import Setting
 from app.autopilots.measurements import Position
-from app.vehicles.end_texts import joined, request_text
-from app.vehicles.flight_end import Landing, StopRequest
+from app.vehicles.flight_end import Landing, StopRequest, joined, request_text
 from app.vehicles.mavlink.events import Command
 from app.vehicles.mavlink.failures import RESPONSES, Failure, Outcome
 from app.vehicles.mavlink.monitors.commanded import SetPointMonitor, SettingMonitor

@@ -9,8 +9,7 @@ from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
-from app.vehicles.end_texts import cause_text
-from app.vehicles.flight_end import FlightEnd, Landing, withdrawn_by
+from app.vehicles.flight_end import FlightEnd, Landing, cause_text, withdrawn_by
 from app.vehicles.mavlink import flight_preparation, ground_observation, preflight, preparation, records
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.connection import VehicleConnection
