@@ -77,18 +77,18 @@ class LoopReports:
                 self.target_m, self.target_s = altitude_m, now_s
 
 
+@dataclass(slots=True)
 class RestartCounter:
     """Counts the restarts of a vehicle on the ground by its positions.
 
     A clock that jumps ahead counts, too: while this computer slept, the vehicle may have restarted.
     """
 
-    def __init__(self) -> None:
-        self.restarts = 0
-        self._last: Position | None = None
-        self._last_s = 0.0
-        self._heard = 0
-        self._other: OtherClock | None = None
+    restarts: int = 0
+    _last: Position | None = None
+    _last_s: float = 0.0
+    _heard: int = 0
+    _other: OtherClock | None = None
 
     def take(self, position: Position, now_s: float) -> None:
         """Process a position received at `now_s` by our clock."""

@@ -4,7 +4,6 @@ from typing import Final
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Heartbeat
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Event,
     GainsRestored,
@@ -130,7 +129,7 @@ def disarming(trial: Trial, event: Event) -> Step:
         trial = replace(trial, remarks=(*trial.remarks, *confirmed), contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     watch, plan = trial.watch, trial.plan
-    stands = trial.takeoff is None and watching.stands_by_own_account(watch, now_s, plan)
+    stands = trial.takeoff is None and watch.stands_by_own_account(now_s, plan)
     airborne = watch.modes.armed and watch.positions.is_airborne(now_s, plan.ground_m)
     if airborne and not (stands or trial.stopped):
         why = "It was in the air when its motors were to be stopped."

@@ -9,7 +9,6 @@ from typing import Final
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Measurement, Parameter
 from app.vehicles.flight_end import Landing
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
     Command,
@@ -55,10 +54,10 @@ def advance(trial: Trial, event: Event) -> Step:
         trial, kept = _process_packet(trial, event)
     elif isinstance(event, SecondaryAltitudeReceived):
         sample = dataclasses.replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
-        trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
+        trial = replace(trial, watch=trial.watch.update_secondary(sample))
     elif isinstance(event, DuplicateVehicleDetected):
-        trial = replace(trial, watch=watching.note_duplicate(trial.watch, event.why))
-    settled = watching.settle(trial.watch, event.now_s, trial.plan, commanded=trial.takeoff is not None)
+        trial = replace(trial, watch=trial.watch.note_duplicate(event.why))
+    settled = trial.watch.settle(event.now_s, trial.plan, commanded=trial.takeoff is not None)
     trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
     trial, polls = _poll_settings(trial, event.now_s)
@@ -94,7 +93,7 @@ def _confirm_take_off(trial: Trial, event: Event) -> Step:
 
 
 def _process_packet(trial: Trial, event: PacketReceived) -> Step:
-    watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan)
+    watch, positions = trial.watch.update(event.measurement, event.now_s, trial.plan)
     trial = _with_disarmed_height(trial, watch, event.now_s)
     trial, requests = _check_settings(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.identity.rebooted:
@@ -170,7 +169,7 @@ def _with_drift(trial: Trial, now_s: float) -> Trial:
         return trial
     watch, plan = trial.watch, trial.plan
     is_told_to_land = trial.state not in STATES_WITH_TRIAL_GAINS
-    has_landed = is_told_to_land and watching.has_reported_landing(watch, now_s, plan)
+    has_landed = is_told_to_land and watch.has_reported_landing(now_s, plan)
     trial = note_cause(trial, watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed))
     return note(trial, watch.ground.find_contradiction(now_s))
 

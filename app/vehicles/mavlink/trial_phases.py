@@ -5,7 +5,6 @@ from typing import Final
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
     ActionDone,
@@ -56,16 +55,16 @@ def _arm(trial: Trial, event: Event) -> Step:
     if finding := (
         (Finding(Failure.NOT_ARMED, event.why) if isinstance(event, ActionRefused) else None)
         or find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED)
-        or watching.find_on_ground(trial.watch, trial.plan, now_s)
+        or trial.watch.find_on_ground(trial.plan, now_s)
         or _not_armed(trial, event)
     ):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    trial = measure_ground(replace(trial, watch=watching.begin_climb(trial.watch, last.altitude_m)), now_s)
+    trial = measure_ground(replace(trial, watch=trial.watch.begin_climb(last.altitude_m)), now_s)
     watch, plan = trial.watch, trial.plan
-    stands = watching.stands_by_own_account(watch, now_s, plan)
+    stands = watch.stands_by_own_account(now_s, plan)
     if finding := (
         watch.positions.find_departure(plan.ground_m, stands=stands)
         or watch.second.find_disagreement_on_ground(last.altitude_m, trial.ground_shift_m, now_s)
@@ -118,7 +117,7 @@ def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
     decides_soon = not watch.modes.armed or watch.positions.unchanged_s > _STUCK_S
     if _waited_s(trial) <= lift_off_s or decides_soon or not watch.positions.is_fresh(now_s):
         return None
-    if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
+    if trial.watch.is_said_to_fly(now_s, trial.plan.ground_m):
         return Finding(Failure.LOST_POSITION, "It reports that it flies, but its altitude stayed on the ground.")
     return Finding(Failure.NO_LIFT_OFF, f"It was still on the ground {lift_off_s:g} s after the command.")
 

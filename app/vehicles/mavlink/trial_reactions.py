@@ -11,7 +11,6 @@ from typing import Final
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Parameter
 from app.vehicles.flight_end import Landing, StopRequest, request_text
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GROUND_M, RESPONSES, Failure, Finding, Reaction
 from app.vehicles.mavlink.plan import replace
@@ -52,8 +51,8 @@ def find_in_flight(trial: Trial, now_s: float) -> Finding | None:
         or watch.positions.find_jump()
         or watch.envelope.find(plan, watch.last, settling=True)
         or watch.modes.find_own_landing(plan, watch.last, mode_known=bool(modes))
-        or watching.find_frozen(watch, plan, now_s)
-        or watching.find_lost_position(watch, plan, now_s)
+        or watch.find_frozen(plan, now_s)
+        or watch.find_lost_position(plan, now_s)
         or watch.second.find_disagreement()
         or watch.battery.find(now_s)
     )
@@ -133,7 +132,7 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
     and is reset by an autopilot that counts from the ground. If it may have moved, the ground is unchanged."""
     watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
     stood = samples[len(samples) // 2 :]
-    if not stood or watch.positions.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
+    if not stood or watch.positions.doubted or watch.is_said_to_fly(now_s, plan.ground_m):
         return trial
     altitudes_m = [position.altitude_m for position in stood]
     is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
@@ -148,7 +147,7 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
     return replace(
         trial,
         plan=plan.on_ground_at(plan.ground_m + shift_m),
-        watch=watching.reset_altitude(watch),
+        watch=watch.reset_altitude(),
         ground_shift_m=shift_m,
         ground_samples=(),
     )
@@ -227,7 +226,7 @@ def disarm(trial: Trial, now_s: float) -> Step:
 
 def find_doubt_of_ground(trial: Trial, now_s: float) -> str:
     """Return why its motors may not be stopped without a request of a person; empty if they may."""
-    return find_doubt_of_descent(trial, now_s) or watching.find_doubt_of_ground(trial.watch, now_s)
+    return find_doubt_of_descent(trial, now_s) or trial.watch.find_doubt_of_ground(now_s)
 
 
 def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
@@ -267,14 +266,14 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
     or it has not been commanded to take off and nothing shows that it moved."""
     watch, ground_m = trial.watch, trial.plan.ground_m
-    stands = watching.stands_by_own_account(watch, now_s, trial.plan)
-    is_arming = trial.state is State.ARM and not watching.is_said_to_fly(watch, now_s, ground_m)
+    stands = watch.stands_by_own_account(now_s, trial.plan)
+    is_arming = trial.state is State.ARM and not watch.is_said_to_fly(now_s, ground_m)
     if trial.takeoff is None and (stands or is_arming):
         return ""
     if watch.positions.is_airborne(now_s, ground_m):
         height_m = watch.positions.height_m(ground_m)
         return f"The vehicle was {height_m:.1f} m above the ground: inspect it before it flies again."
-    if watch.positions.is_grounded(now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
+    if watch.positions.is_grounded(now_s, ground_m) and not watch.is_said_to_fly(now_s, ground_m):
         return ""
     return "The vehicle was not known to be on the ground: inspect it before it flies again."
 

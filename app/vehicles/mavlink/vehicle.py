@@ -11,12 +11,12 @@ from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import FlightEnd, Landing, cause_text, withdrawn_by
 from app.vehicles.mavlink import flight_preparation, ground_observation, preflight, preparation, records
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.connection import VehicleConnection
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flight_preparation import flies_steps
 from app.vehicles.mavlink.ground_observation import GroundObservation
+from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.parameters import written
 from app.vehicles.mavlink.records import AlignedRecord, Reference, Scored, add_secondary_altitude, with_flown_set_points
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
@@ -187,7 +187,7 @@ class MavlinkVehicle(VehicleConnection):
         self._quarantine.enter(State.ARM)
         plan = flight_preparation.plan_of(order, ground, self._radio, self._options, self._gains)
         self._gains.staged = self._repeated = None
-        watch = watching.begin(
+        watch = TrialObservation.begin(
             self._radio.clock.now_s(),
             last=last,
             battery_v=self._radio.seen.battery_v,

@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink import observation as watching
 from tests.vehicles.mavlink.monitors.observing import watch_of
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN
 
@@ -9,14 +8,14 @@ from tests.vehicles.mavlink.walking import GROUND_M, PLAN
 def test_a_lone_jump_is_dropped_and_counted() -> None:
     watch = watch_of(3.0, 3.0, 3.6)
     assert (watch.last, watch.positions.glitches) == (Position(10.02, 3.0, 0.0), 0)
-    watch, kept = watching.update(watch, Position(10.06, 3.0, 0.0), 10.06, PLAN)
+    watch, kept = watch.update(Position(10.06, 3.0, 0.0), 10.06, PLAN)
     assert kept == (Position(10.06, 3.0, 0.0),)
     assert watch.positions.glitches == 1
 
 
 def test_a_jump_that_stays_is_where_the_vehicle_is() -> None:
     watch = watch_of(3.0, 3.0, 3.6)
-    watch, kept = watching.update(watch, Position(10.06, 3.6, 0.0), 10.06, PLAN)
+    watch, kept = watch.update(Position(10.06, 3.6, 0.0), 10.06, PLAN)
     assert [position.time_boot_s for position in kept] == [10.04, 10.06]
     assert watch.positions.glitches == 0
 
