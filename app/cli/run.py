@@ -41,7 +41,7 @@ from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
 from app.flights.service import fly_new_trial
 from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError, find_mismatch
-from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import end_text
 from app.vehicles.registry import get_kind, open_vehicle
 
 

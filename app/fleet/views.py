@@ -21,7 +21,7 @@ from app.db.models import FlightRow, VehicleActRow, VehicleRow
 from app.db.pages import Order, page_of
 from app.fleet import repository
 from app.fleet.schemas import GivenGains, VehicleAct
-from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import end_text
 
 _NEWEST_FIRST: Final = "-at"
 

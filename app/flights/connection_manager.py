@@ -32,8 +32,7 @@ from app.flights.service import record_abort
 from app.flights.worker_part import WorkerPart
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError
-from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
-from app.vehicles.flight_end import StopRequest
+from app.vehicles.flight_end import REQUESTED_BY_OPERATOR, StopRequest
 
 T = TypeVar("T")
 

@@ -48,8 +48,7 @@ from app.vehicles.base import (
     Vehicle,
     VehicleError,
 )
-from app.vehicles.end_texts import REQUESTED_BY_OPERATOR
-from app.vehicles.flight_end import StopRequest
+from app.vehicles.flight_end import REQUESTED_BY_OPERATOR, StopRequest
 from app.vehicles.registry import get_kind, restore_safe_gains
 
 _NOT_READY: Final[Mapping[Staging, str]] = {

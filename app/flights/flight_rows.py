@@ -30,8 +30,16 @@ from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord, find_mismatch
-from app.vehicles.end_texts import end_text
-from app.vehicles.flight_end import FlightEnd, GainsLeft, Landing, Requester, StopRequest, not_begun, withdrawn_by
+from app.vehicles.flight_end import (
+    FlightEnd,
+    GainsLeft,
+    Landing,
+    Requester,
+    StopRequest,
+    end_text,
+    not_begun,
+    withdrawn_by,
+)
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""

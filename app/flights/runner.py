@@ -29,7 +29,7 @@ from app.flights.record_spool import Spool
 from app.flights.worker_part import AbortFlag, WorkerPart
 from app.live.messages import FlightPhase, Phase
 from app.vehicles.base import find_mismatch
-from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import end_text
 from app.vehicles.registry import get_kind
 
 STAGED_FOR_S: Final = 600.0

@@ -38,8 +38,7 @@ from app.fleet.control import (
 from app.flights import flight_rows
 from app.flights.readiness import Standing, TrialReadiness, readiness_of, require_ready
 from app.live.hub import VehicleReport
-from app.vehicles.end_texts import request_text, unstaged_text
-from app.vehicles.flight_end import Landing, Requester, StopRequest, withdrawn_by
+from app.vehicles.flight_end import Landing, Requester, StopRequest, request_text, unstaged_text, withdrawn_by
 
 ReportOf = Callable[[int], VehicleReport]
 """What is known of a vehicle at this moment, by its id."""

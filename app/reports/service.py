@@ -38,8 +38,7 @@ from app.fleet import service as fleet
 from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
 from app.fleet.views import acts_view, ledger_view
 from app.vehicles.base import Identity
-from app.vehicles.end_texts import cause_text
-from app.vehicles.flight_end import FlightEnd
+from app.vehicles.flight_end import FlightEnd, cause_text
 from app.vehicles.registry import VEHICLE_KINDS
 
 _PAGE: Final = 200

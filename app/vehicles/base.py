@@ -17,8 +17,7 @@ from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
-from app.vehicles.end_texts import cause_text
-from app.vehicles.flight_end import FlightEnd, Landing, StopRequest
+from app.vehicles.flight_end import FlightEnd, Landing, StopRequest, cause_text
 
 OptionValue = bool | int | float | str
 Ending = Literal["completed", "aborted", "invalid"]

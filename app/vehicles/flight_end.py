@@ -1,9 +1,12 @@
-"""How a flight ended, in codes and names, from the trial to the page. Sentences about it are made by `end_texts`; no
-decision reads them.
+"""How a flight ended, in codes and names, from the trial to the page, and the sentences about it for people: made from
+its codes where somebody reads them. No decision reads a sentence.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
 
 
 class Failure(StrEnum):
@@ -100,3 +103,103 @@ def not_begun(*remarks: str) -> FlightEnd:
 def withdrawn_by(request: StopRequest) -> FlightEnd:
     """Return the end of a flight that was aborted before its vehicle left the ground."""
     return FlightEnd(failure=Failure.OPERATOR, request=request, landed=Landing.STAYED)
+
+
+# ---- sentences
+
+FAILURE_TEXTS: Final[Mapping[Failure, str]] = MappingProxyType(
+    {
+        Failure.NO_HEARTBEAT: "No heartbeat was received; nothing was sent.",
+        Failure.PARAMETER: "The vehicle did not confirm its gains; it was not armed.",
+        Failure.NOT_ARMED: "The vehicle did not arm.",
+        Failure.NO_LIFT_OFF: "The vehicle did not lift off.",
+        Failure.TAKE_OFF_REFUSED: "The vehicle did not lift off.",
+        Failure.LINK: "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe "
+        "or flight plan lands it.",
+        Failure.ENVELOPE: "A safety limit was exceeded.",
+        Failure.FROZEN: "The vehicle's position froze while packets still arrived.",
+        Failure.GLITCHES: "Too many samples had to be dropped.",
+        Failure.DISAGREEMENT: "Two sources of altitude disagree.",
+        Failure.LOST_POSITION: "The vehicle's position was lost.",
+        Failure.SLOW_CLOCK: "The vehicle's clock is slower than the clock speed in its settings.",
+        Failure.TAKEN_OVER: "A pilot took manual control; no further commands were sent.",
+        Failure.UNEXPECTED: "The vehicle changed its state without a command. It was commanded to land; its motors "
+        "were not stopped.",
+        Failure.INTERRUPTED: "The flight may have been interrupted.",
+        Failure.OWN_LANDING: "The vehicle began to land by itself.",
+        Failure.DUPLICATE: "Two vehicles use the same system id. Both were commanded to land; their motors were not "
+        "stopped.",
+        Failure.FALL: "The vehicle fell.",
+        Failure.SET_POINT: "The vehicle did not confirm a new set point.",
+        Failure.NOT_SETTLED: "The steps were not flown.",
+        Failure.PAUSED: "The set points paused.",
+    }
+)
+"""What each failure means. The remarks alone explain a low battery, and a request itself."""
+
+REQUESTED_BY_OPERATOR: Final = "requested by the operator"
+_ORIGINS: Final[Mapping[Requester, str]] = MappingProxyType(
+    {
+        Requester.OPERATOR: "by the operator",
+        Requester.BROWSER: "from another browser",
+        Requester.DEVICE: "from another device",
+        Requester.SCRIPT: "by a script",
+    }
+)
+_OF_PROGRAM: Final[Mapping[Requester, str]] = MappingProxyType(
+    {Requester.PROGRAM_STOPPED: "Gainline was stopped", Requester.WORKER_EXITED: "the worker has exited"}
+)
+_RESTORED: Final = "It landed the vehicle and restored the safe gains."
+_RESTORED_ON_GROUND: Final = (
+    "It restored the safe gains before the takeoff. Request the flight again if it is still needed."
+)
+_BEFORE_LIFT_OFF: Final = "before lift-off"
+
+
+def joined(*parts: str) -> str:
+    return " ".join(part for part in parts if part)
+
+
+def requested(command: str, words: str) -> str:
+    """`Land was requested: too low.`; without words `Land was requested by the operator.`"""
+    return f"{command} was requested: {words}." if words else f"{command} was {REQUESTED_BY_OPERATOR}."
+
+
+def unstaged_text(by: Requester) -> str:
+    """`unstaged by the operator`."""
+    return f"unstaged {_ORIGINS[by]}"
+
+
+def is_worded(request: StopRequest) -> bool:
+    """Whether more is told about a request than who made it."""
+    return bool(request.words) or request.motors_off or request.by in _OF_PROGRAM
+
+
+def request_text(request: StopRequest, verb: str = "aborted") -> str:
+    """The words of a request that ended a flight; `aborted by the operator` without any."""
+    if request.motors_off:
+        return requested("Motors off", request.words)
+    return _OF_PROGRAM.get(request.by) or request.words or f"{verb} {_ORIGINS[request.by]}".lstrip()
+
+
+def cause_text(end: FlightEnd, verb: str = "aborted") -> str:
+    """Why a flight ended early or does not count, and the remarks on it. `verb` is said of a request without words."""
+    if end.request is None or end.failure not in {None, Failure.OPERATOR}:
+        first = "" if end.failure is None else FAILURE_TEXTS.get(end.failure, "")
+    elif end.failure is None:
+        first = unstaged_text(end.request.by)
+    else:
+        first = request_text(end.request, verb)
+        if end.requested_by is Requester.PROGRAM_STOPPED and end.gains_left is GainsLeft.SAFE:
+            first = f"{first}. {_RESTORED_ON_GROUND if end.landed is Landing.STAYED else _RESTORED}"
+    return joined(first, *end.remarks)
+
+
+def end_text(end: FlightEnd | None) -> str:
+    """The cause, and that a vehicle had not left the ground; empty without an end."""
+    if end is None or end.landed is not Landing.STAYED or end.failure is None:
+        return "" if end is None else cause_text(end)
+    request, on_ground = end.request, f"{'aborted' if end.request else 'ended'} {_BEFORE_LIFT_OFF}"
+    if request is not None and (request.by is Requester.PROGRAM_STOPPED or not is_worded(request)):
+        return cause_text(end, on_ground)
+    return f"{on_ground}: {cause_text(end)}"

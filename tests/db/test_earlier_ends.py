@@ -12,7 +12,7 @@ from alembic.config import Config
 from app.db.earlier_ends import give_end, read_end
 from app.db.session import open_engine
 from app.db.types import FLIGHT_END
-from app.vehicles.end_texts import end_text
+from app.vehicles.flight_end import end_text
 
 LINK = (
     "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe or flight plan "

@@ -12,8 +12,7 @@ from app.db.types import FLIGHT_END
 from app.flights import flight_rows
 from app.flights.flight_rows import FlightOutcome
 from app.vehicles.base import FlightRecord
-from app.vehicles.end_texts import end_text
-from app.vehicles.flight_end import Failure, FlightEnd, GainsLeft, Landing, Requester, StopRequest
+from app.vehicles.flight_end import Failure, FlightEnd, GainsLeft, Landing, Requester, StopRequest, end_text
 from tests.builders import (
     claim,
     climb_error,

@@ -29,8 +29,7 @@ from app.flights.process_messages import (
 from app.flights.runner import FlightRunner
 from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.live.messages import FlightPhase, PublishedMessage
-from app.vehicles.end_texts import end_text
-from app.vehicles.flight_end import StopRequest, withdrawn_by
+from app.vehicles.flight_end import StopRequest, end_text, withdrawn_by
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.campaigns.trials.states import make_vehicle_real
 from tests.clocks import SimulatedClock

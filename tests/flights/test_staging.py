@@ -24,8 +24,17 @@ from app.live.link import LiveServer
 from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
 from app.main import create_app
 from app.vehicles.base import FlightRecord
-from app.vehicles.end_texts import end_text, unstaged_text
-from app.vehicles.flight_end import Failure, FlightEnd, GainsLeft, Landing, Requester, StopRequest, withdrawn_by
+from app.vehicles.flight_end import (
+    Failure,
+    FlightEnd,
+    GainsLeft,
+    Landing,
+    Requester,
+    StopRequest,
+    end_text,
+    unstaged_text,
+    withdrawn_by,
+)
 from tests.builders import (
     WORKER,
     Json,

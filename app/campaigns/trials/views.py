@@ -31,8 +31,7 @@ from app.core.statistics.comparisons import Group, PooledScatter, compare, group
 from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
-from app.vehicles.end_texts import cause_text, end_text, is_worded, unstaged_text
-from app.vehicles.flight_end import Requester
+from app.vehicles.flight_end import Requester, cause_text, end_text, is_worded, unstaged_text
 
 CONFIDENCE: Final = 0.9
 

@@ -18,6 +18,10 @@ Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
 is unusable. quarantine: as invalid, and the vehicle's state is uncertain."""
 
 Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land", "repeat land", "cease", "note"]
+"""land, gains first: the gains are suspect, and the safe gains are sent before Land. A vehicle that lifts off late,
+with its integrator wound up, is treated in the same way. One that has not settled may ring, and would land for seconds
+on these gains, but may also drift, or be moved by its estimator or the wind: the flight is invalid, and does not count
+against the gains, unless it exceeds a limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,21 +75,14 @@ class Finding:
     request: StopRequest | None = None
 
 
-GAIN_FAILURES: Final = frozenset(
-    {failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"}
-)
-"""Failures in which the gains are suspect: the safe gains are sent before Land. A vehicle that lifts off late, with its
-integrator wound up, is treated in the same way. One that has not settled may ring, and would land for seconds on these
-gains, but may also drift, or be moved by its estimator or the wind: the flight is invalid, and does not count against
-the gains, unless it exceeds a limit."""
-
-
 CONFIRMATION_PERIODS: Final = 1.05
 """Heartbeat periods between two heartbeats that confirm each other: a contradicting one would arrive between them."""
 HEARTBEATS_MISSED: Final = 3.5
 """Heartbeat periods without a heartbeat after which the vehicle counts as lost."""
 GROUND_M: Final = 0.15
 """Height below which a vehicle may be standing on the ground."""
+DRIFT_M: Final = 1.0
+"""Greatest drift of an altitude during a flight."""
 REPEAT_S: Final = 1.0
 """Interval at which a command is repeated until the vehicle responds."""
 _LAND_REPEATED_S: Final = 5.0

@@ -8,7 +8,7 @@ from app.autopilots.autopilot import AutopilotError
 from app.autopilots.measurements import Heartbeat, Version
 from app.autopilots.registry import AUTOPILOTS
 from app.vehicles.base import Identity, VehicleError
-from app.vehicles.end_texts import FAILURE_TEXTS
+from app.vehicles.flight_end import FAILURE_TEXTS
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.radio import HEARTBEAT_WITHIN_S, LISTEN_S, AutopilotLink

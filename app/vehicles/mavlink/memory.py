@@ -20,12 +20,26 @@ from app.autopilots.measurements import (
     Version,
 )
 from app.core.records.trajectory import THROTTLE_HOLDS_S
-from app.vehicles.mavlink.boot_clock import RestartCounter
+from app.vehicles.mavlink.monitors.clock import (
+    AHEAD_S,
+    BACK_S,
+    DRIFT,
+    RESTARTED_S,
+    OtherClock,
+    may_have_begun,
+    unwrapped,
+)
 
 _POSITIONS: Final = 1000
 _STATUS_TEXTS: Final = 5
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
+_BEHIND_S: Final = 20.0
+"""A clock that fell behind ours by more than this was not only late: the vehicle may have restarted while nothing was
+heard."""
+_KNOWN_BY: Final = 10
+"""Positions by a clock before it is known to be the vehicle's. Fewer may be a stranger's, heard before the vehicle's
+own positions were requested."""
 
 
 @dataclass(slots=True)
@@ -61,8 +75,47 @@ class LoopReports:
                 self.altitude_error_m, self.altitude_error_s = error_m, now_s
             case TargetAltitude(altitude_m=altitude_m):
                 self.target_m, self.target_s = altitude_m, now_s
-            case _:
-                pass
+
+
+@dataclass(slots=True)
+class RestartCounter:
+    """Counts the restarts of a vehicle on the ground by its positions.
+
+    A clock that jumps ahead counts, too: while this computer slept, the vehicle may have restarted.
+    """
+
+    restarts: int = 0
+    _last: Position | None = None
+    _last_s: float = 0.0
+    _heard: int = 0
+    _other: OtherClock | None = None
+
+    def take(self, position: Position, now_s: float) -> None:
+        """Process a position received at `now_s` by our clock."""
+        position = unwrapped(position, self._last)
+        if self._last is None or self._is_expected(self._last, position, now_s):
+            self._last, self._last_s, self._other = position, now_s, None
+            self._heard += 1
+        elif not -BACK_S <= position.time_boot_s - self._last.time_boot_s <= 0.0:  # otherwise it is late or repeated
+            self._take_other(position, now_s)
+
+    def _is_expected(self, last: Position, position: Position, now_s: float) -> bool:
+        """Whether the position is by the same clock. One that fell behind may be that of a simulation that stood still,
+        unless it can have begun since the last position."""
+        gained_s, passed_s = position.time_boot_s - last.time_boot_s, now_s - self._last_s
+        is_behind = gained_s < (1.0 - DRIFT) * passed_s - _BEHIND_S
+        return 0.0 < gained_s <= passed_s + AHEAD_S and not (
+            is_behind and may_have_begun(position.time_boot_s, passed_s)
+        )
+
+    def _take_other(self, position: Position, now_s: float) -> None:
+        other = self._other
+        first_s = other.first_s if other is not None and other.goes_on(position, now_s) else now_s
+        if now_s - first_s < RESTARTED_S:
+            self._other = OtherClock(first_s=first_s, last_s=now_s, last=position)
+        else:
+            self.restarts += self._heard >= _KNOWN_BY
+            self._last, self._last_s, self._other, self._heard = position, now_s, None, 1
 
 
 @dataclass(slots=True)
@@ -133,8 +186,6 @@ class VehicleMemory:
                 self.has_ground_reference &= self.restarts == before
             case StatusText():
                 self._add_chunk(measurement, now_s)
-            case _:
-                pass
 
     def _add_chunk(self, chunk: StatusText, now_s: float) -> None:
         """Assemble the chunks of a status text in order; a lost chunk is not waited for."""

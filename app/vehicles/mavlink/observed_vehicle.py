@@ -10,13 +10,13 @@ from app.autopilots.commands import Action
 from app.core.clock import Clock
 from app.core.policy import Gains
 from app.vehicles.base import Identity, VehicleError
-from app.vehicles.end_texts import requested
+from app.vehicles.flight_end import requested
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters
 from app.vehicles.mavlink.altitude_sources import AltitudeSource
-from app.vehicles.mavlink.boot_clock import RESTARTED_S
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
+from app.vehicles.mavlink.monitors.clock import RESTARTED_S
 from app.vehicles.mavlink.on_ground import ARMED
 from app.vehicles.mavlink.radio import LISTEN_S, open_radio
 from app.vehicles.mavlink.sent_commands import STOPPING_S, RepeatedCommand, set_up

@@ -16,7 +16,7 @@ from app.autopilots.commands import Outgoing, Setting
 from app.autopilots.measurements import Measurement, Parameter
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch
-from app.vehicles.end_texts import FAILURE_TEXTS
+from app.vehicles.flight_end import FAILURE_TEXTS
 from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink

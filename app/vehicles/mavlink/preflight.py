@@ -22,7 +22,7 @@ from app.vehicles.base import (
     VehicleError,
 )
 from app.vehicles.mavlink.altitude_sources import AltitudeSource
-from app.vehicles.mavlink.boot_clock import unwrapped
+from app.vehicles.mavlink.monitors.clock import unwrapped
 from app.vehicles.mavlink.on_ground import (
     ARMED,
     LAND_FIRST,

@@ -1,17 +1,21 @@
 """Record of a trial: its samples as a trajectory, with both sources of altitude, aligned, if there are two, one of
-which is scored; and how it ended.
+which is scored; its set points at the times at which they took effect, and Paparazzi's own reference for them, which it
+does not send: the replica of its loop computes it; and how it ended.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
 
+from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.errors import TrajectoryError
 from app.core.experiments.step_sequence import REFERENCE, SETTLED_FOR_S
 from app.core.formatting import count
+from app.core.models.set_points import SetPoints, on_step
+from app.core.models.vertical_batch import reference_altitude
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import Samples, Trajectory
@@ -19,11 +23,14 @@ from app.vehicles.base import Ending, OptionValue
 from app.vehicles.flight_end import FlightEnd, GainsLeft
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.monitors.second_source import MAX_DIFFERENCE_M
+from app.vehicles.mavlink.monitors.altitude import MAX_DIFFERENCE_M
+from app.vehicles.mavlink.monitors.commanded import SetPointChange
 from app.vehicles.mavlink.trial_state import State, Trial
 
 Scored = Literal["vehicle", "mocap"]
 """Source of the scored altitude."""
+Reference = Callable[[SetPoints, Samples], Samples]
+"""The autopilot's own reference for these set points, at these times."""
 
 _STEPPED: Final = ("set_point_m", "throttle")
 """Channels that jump: between two samples the first one is held."""
@@ -124,15 +131,13 @@ def _on_the_second_s_times(trajectory: Trajectory, second_s: Samples, second_m: 
 
 
 SOURCE: Final = "mavlink"
-_SCORED: Final = "altitude_m"
-_OTHER: Final = "altitude_2_m"
 
 
 def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[str, float]:
     """Return a sample's channels; altitudes count from `datum_m` on the vehicle's own datum."""
     own_m = sample.position.altitude_m - datum_m
     channels = {
-        _SCORED: own_m,
+        "altitude_m": own_m,
         "climb_rate_m_s": sample.position.climb_rate_m_s,
         "set_point_m": sample.set_point_m - datum_m,
     }
@@ -145,7 +150,7 @@ def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[st
     if sample.second_m is not None:
         second_m = sample.second_m - datum_m
         scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)
-        channels |= {_SCORED: scored_m, _OTHER: other_m}
+        channels |= {"altitude_m": scored_m, "altitude_2_m": other_m}
     return channels
 
 
@@ -189,12 +194,74 @@ def _with_references(samples: Sequence[RecordSample], begin_s: float) -> Sequenc
     ]
 
 
+def simulate_reference(set_points: SetPoints, ground_m: float, time_s: Samples, until_s: float) -> Samples:
+    """Paparazzi's reference at each of these times, from the ground at the takeoff command on: same shape.
+
+    Altitudes are the record's; one computation reaches to `until_s`, and is kept for the next call.
+    """
+    above_ground_m = tuple(altitude_m - ground_m for altitude_m in set_points.altitudes_m)
+    samples = round(until_s * RATE_HZ) + 1
+    above = reference_altitude(SetPoints(set_points.times_s, above_ground_m), samples)
+    return np.asarray(ground_m + np.interp(time_s, np.arange(samples) * STEP_S, above))
+
+
+def at_last_times(takeoff: SetPoints, changes: Sequence[SetPointChange]) -> SetPoints:
+    """The set points, each from the last time at which it may have taken effect."""
+    return _appended(takeoff, [(change.times_s[-1], change.altitude_m) for change in changes])
+
+
+def with_flown_set_points(
+    trajectory: Trajectory,
+    takeoff: SetPoints,
+    changes: Sequence[SetPointChange],
+    *,
+    ground_m: float,
+    reference: Reference | None,
+) -> Trajectory:
+    """Return the record with its set points from when they took effect, and with the `reference`, if there is one.
+    `ground_m` is the set point of a landing.
+
+    A set point whose message was repeated took effect at the one of its times from which the reference is closest to
+    the altitude. A record that contains a landing, whose reference is not known, gets none.
+    """
+    time_s, channels = trajectory.time_s, trajectory.channels
+    flown = takeoff
+    for number, change in enumerate(changes):
+        until_s = changes[number + 1].times_s[0] if number + 1 < len(changes) else time_s[-1]
+        flown = _closest(trajectory, flown, change, until_s, reference)
+    after = time_s > 0.0
+    flies = after & (channels["set_point_m"] != ground_m)
+    changed = {**channels, "set_point_m": np.where(flies, flown.at(time_s), channels["set_point_m"])}
+    if reference is not None:
+        computed = {REFERENCE: reference(flown, time_s)} if np.array_equal(flies, after) else {}
+        changed = {name: values for name, values in changed.items() if name != REFERENCE} | computed
+    return replace(trajectory, channels=changed)
+
+
+def _closest(
+    trajectory: Trajectory, before: SetPoints, change: SetPointChange, until_s: float, reference: Reference | None
+) -> SetPoints:
+    candidates = [_appended(before, [(time_s, change.altitude_m)]) for time_s in change.times_s]
+    if reference is None or len(candidates) == 1:
+        return candidates[-1]
+    window = (trajectory.time_s >= change.times_s[0]) & (trajectory.time_s < until_s)
+    time_s, altitude = trajectory.time_s[window], trajectory["altitude_m"][window]
+    return min(candidates, key=lambda each: float(np.abs(reference(each, time_s) - altitude).mean()))
+
+
+def _appended(set_points: SetPoints, changes: Sequence[tuple[float, float]]) -> SetPoints:
+    times_s, altitudes_m = list(set_points.times_s), list(set_points.altitudes_m)
+    for time_s, altitude_m in changes:
+        times_s.append(max(on_step(time_s), times_s[-1] + STEP_S))
+        altitudes_m.append(altitude_m)
+    return SetPoints(tuple(times_s), tuple(altitudes_m))
+
+
 def ending_of(trial: Trial) -> Ending:
     """Return the ending of the record, independent of a quarantine of the vehicle."""
-    outcome = None if trial.failure is None else RESPONSES[trial.failure].outcome
-    if outcome is None:
+    if trial.failure is None:
         return "completed"
-    return "aborted" if outcome == "aborted" else "invalid"
+    return "aborted" if RESPONSES[trial.failure].outcome == "aborted" else "invalid"
 
 
 def hover_throttle_of(trajectory: Trajectory, *, until_s: float) -> float | None:

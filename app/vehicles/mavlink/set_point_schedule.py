@@ -15,12 +15,10 @@ from app.autopilots.measurements import Position
 from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
 from app.core.formatting import count
 from app.core.models.set_points import SetPoints
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import ActionDone, PerformAction
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.monitors.set_points import SetPointChange
-from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.monitors.commanded import SetPointChange
+from app.vehicles.mavlink.plan import Plan, replace
 from app.vehicles.mavlink.trial_state import Step, Trial
 
 HELD_BEFORE_S: Final = 6.0
@@ -121,7 +119,7 @@ def command_next(trial: Trial) -> Step:
     trial = replace(
         trial,
         plan=dataclasses.replace(trial.plan, set_point_m=set_point_m),
-        watch=watching.change_set_point(trial.watch, set_point_m),
+        watch=trial.watch.change_set_point(set_point_m),
         set_points=commanded,
     )
     acceleration_m_s2 = trial.plan.set_points.acceleration_of(number)

@@ -29,10 +29,10 @@ from app.vehicles.mavlink.events import (
     WithdrawSetPoint,
 )
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
-from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.records import Reference, at_last_times
 from app.vehicles.mavlink.sent_commands import CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import advance, begin
@@ -56,10 +56,6 @@ _SAMPLE_EVERY_S: Final = 0.015
 """Minimum interval of live telemetry; records keep every sample."""
 
 
-def _no_secondary() -> Sequence[SecondaryAltitudeReceived]:
-    return ()
-
-
 class TrialRunner:
     """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
 
@@ -81,7 +77,7 @@ class TrialRunner:
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
         channels: Callable[[RecordSample, float], dict[str, float]],
-        look: Callable[[], Sequence[SecondaryAltitudeReceived]] = _no_secondary,
+        look: Callable[[], Sequence[SecondaryAltitudeReceived]],
         reference: Reference | None = None,
     ) -> None:
         self.reference = reference
@@ -99,8 +95,7 @@ class TrialRunner:
         self._listened_s = self._sank_s = radio.clock.now_s()
         self._listens_first = False
         self._sank_to_m = float("inf")
-        self.trial, commands = begin(plan, watch, radio.clock.now_s())
-        self._begin_with = commands
+        self.trial, self._begin_with = begin(plan, watch, radio.clock.now_s())
 
     @property
     def trouble(self) -> str:
@@ -187,7 +182,10 @@ class TrialRunner:
         stop = self._kept(self._should_stop)
         if self.error is None or (stop is not None and stop.motors_off):
             return stop
-        return StopRequest(_describe_error(self.error), by=Requester.INTERNAL_ERROR)
+        words = f"internal error ({type(self.error).__name__}: {self.error})"
+        if isinstance(self.error, KeyboardInterrupt):
+            words = "interrupted from the keyboard"
+        return StopRequest(words, by=Requester.INTERNAL_ERROR)
 
     def _advance(self, event: Event) -> None:
         before = self.trial.state
@@ -277,12 +275,6 @@ class TrialRunner:
             self._shown_s = time_s
             shown = Sample(time_s, self._channels(sample, self.trial.plan.datum_m))
             self._kept(lambda: self._on_sample(shown))
-
-
-def _describe_error(error: BaseException) -> str:
-    if isinstance(error, KeyboardInterrupt):
-        return "interrupted from the keyboard"
-    return f"internal error ({type(error).__name__}: {error})"
 
 
 def in_order(

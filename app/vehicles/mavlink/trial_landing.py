@@ -4,7 +4,6 @@ from typing import Final
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Heartbeat
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Event,
     GainsRestored,
@@ -13,23 +12,20 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     confirms_motors_off,
 )
-from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, land_every_s
-from app.vehicles.mavlink.monitors.positions import DRIFT_M
-from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_findings import (
-    find_change,
-    find_taken_over,
-    may_be_by_hand,
-)
+from app.vehicles.mavlink.failures import DESCENDING_M_S, DRIFT_M, REPEAT_S, Failure, land_every_s
+from app.vehicles.mavlink.plan import replace, since
 from app.vehicles.mavlink.trial_reactions import (
     abort,
     disarm,
     enter,
     fail,
+    find_change,
     find_contact,
     find_doubt_of_descent,
     find_doubt_of_ground,
+    find_taken_over,
     land,
+    may_be_by_hand,
     note,
     quarantine,
     send_gains,
@@ -61,20 +57,20 @@ def landing(trial: Trial, event: Event) -> Step:
         return _come_down(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
         return quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
-    if _is_land_due(trial, now_s) and not _confirms_landing(trial, now_s):
-        return replace(trial, repeated_s=now_s), (PerformAction(Action.LAND),)
-    return trial, ()
+    return (trial, ()) if _confirms_landing(trial, now_s) else _land_again(trial, now_s)
 
 
-def _is_land_due(trial: Trial, now_s: float) -> bool:
+def _land_again(trial: Trial, now_s: float) -> Step:
+    """Repeat Land when it is due."""
     every_s = land_every_s(now_s - trial.since_s, trial.plan.autopilot.land_again_s)
-    return now_s - trial.repeated_s >= every_s and not may_be_by_hand(trial, now_s)
+    if now_s - trial.repeated_s < every_s or may_be_by_hand(trial, now_s):
+        return trial, ()
+    return replace(trial, repeated_s=now_s), (PerformAction(Action.LAND),)
 
 
 def _doubting(trial: Trial) -> Trial:
     """Note a finding that makes the vehicle's state uncertain while it lands for another reason."""
-    finding = find_change(trial) if trial.takeoff is not None else trial.watch.identity.find_duplicate()
-    return trial if finding is None else note(trial, finding)
+    return note(trial, find_change(trial) if trial.takeoff is not None else trial.watch.identity.find_duplicate())
 
 
 def _come_down(trial: Trial, now_s: float) -> Step:
@@ -97,9 +93,7 @@ def resting(trial: Trial, now_s: float) -> Trial:
         rests = trial.watch.ground.grounded_since_s is not None
     else:
         rests = trial.watch.positions.is_still(now_s, trial.plan.ground_m)
-    if rests is (trial.resting_since_s is not None):
-        return trial
-    return replace(trial, resting_since_s=now_s if rests else None)
+    return replace(trial, resting_since_s=since(trial.resting_since_s, now_s, holds=rests))
 
 
 def has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
@@ -121,12 +115,10 @@ def link_lost(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     is_received = isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat)
     if is_received and not may_be_by_hand(trial, now_s):
-        return land(trial, State.ABORT_LAND, now_s)
+        return land(trial, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
         return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
-    if _is_land_due(trial, now_s):
-        return replace(trial, repeated_s=now_s), (PerformAction(Action.LAND),)
-    return trial, ()
+    return _land_again(trial, now_s)
 
 
 def disarming(trial: Trial, event: Event) -> Step:
@@ -137,25 +129,19 @@ def disarming(trial: Trial, event: Event) -> Step:
         trial = replace(trial, remarks=(*trial.remarks, *confirmed), contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     watch, plan = trial.watch, trial.plan
-    stands = trial.takeoff is None and watching.stands_by_own_account(watch, now_s, plan)
+    stands = trial.takeoff is None and watch.stands_by_own_account(now_s, plan)
     airborne = watch.modes.armed and watch.positions.is_airborne(now_s, plan.ground_m)
     if airborne and not (stands or trial.stopped):
         why = "It was in the air when its motors were to be stopped."
         return abort(replace(trial, doubt=trial.doubt or why), now_s)
+    doubt = "" if trial.stopped else find_doubt_of_ground(trial, now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
-        return quarantine(trial, _why_not_stopped(trial, now_s), now_s)
-    may_stop = trial.stopped or not find_doubt_of_ground(trial, now_s)
-    if may_stop and now_s - trial.repeated_s >= REPEAT_S:
+        unconfirmed = f"It has not confirmed within {DISARMED_WITHIN_S:g} s that its motors stopped."
+        return quarantine(trial, f"Its motors were not commanded to stop: {doubt}." if doubt else unconfirmed, now_s)
+    if not doubt and now_s - trial.repeated_s >= REPEAT_S:
         action = Action.KILL if trial.stopped else Action.MOTORS_OFF
         return replace(trial, repeated_s=now_s), (PerformAction(action),)
     return trial, ()
-
-
-def _why_not_stopped(trial: Trial, now_s: float) -> str:
-    doubt = "" if trial.stopped else find_doubt_of_ground(trial, now_s)
-    if doubt:
-        return f"Its motors were not commanded to stop: {doubt}."
-    return f"It has not confirmed within {DISARMED_WITHIN_S:g} s that its motors stopped."
 
 
 def _answered(trial: Trial, event: Event) -> Trial:

@@ -9,7 +9,6 @@ from typing import Final
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Measurement, Parameter
 from app.vehicles.flight_end import Landing
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
     Command,
@@ -22,16 +21,11 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
     StopRequested,
 )
-from app.vehicles.mavlink.failures import REPEAT_S, Failure, Finding
-from app.vehicles.mavlink.monitors.positions import DRIFT_M
-from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
-from app.vehicles.mavlink.monitors.settings import SettingMonitor
+from app.vehicles.mavlink.failures import DRIFT_M, REPEAT_S, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_findings import allowed_modes
+from app.vehicles.mavlink.plan import Plan, replace
 from app.vehicles.mavlink.trial_phases import HANDLERS
-from app.vehicles.mavlink.trial_reactions import fail, measure_ground, note, note_cause, stop_motors
+from app.vehicles.mavlink.trial_reactions import allowed_modes, fail, measure_ground, note, note_cause, stop_motors
 from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, State, Step, Trial
 
 _REPLY_S: Final = 0.5
@@ -48,9 +42,7 @@ _RECORDED: Final = STATES_WITH_TRIAL_GAINS | {State.ARM, State.ABORT_LAND, State
 
 def begin(plan: Plan, watch: TrialObservation, now_s: float) -> Step:
     """Begin the trial of a vehicle that stands disarmed on the ground with its gains confirmed: command it to arm."""
-    settings, set_points = SettingMonitor(), SetPointMonitor()
-    trial = Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch, settings=settings, set_points=set_points)
-    return trial, (PerformAction(Action.ARM),)
+    return Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch), (PerformAction(Action.ARM),)
 
 
 def advance(trial: Trial, event: Event) -> Step:
@@ -62,10 +54,10 @@ def advance(trial: Trial, event: Event) -> Step:
         trial, kept = _process_packet(trial, event)
     elif isinstance(event, SecondaryAltitudeReceived):
         sample = dataclasses.replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
-        trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
+        trial = replace(trial, watch=trial.watch.update_secondary(sample))
     elif isinstance(event, DuplicateVehicleDetected):
-        trial = replace(trial, watch=watching.note_duplicate(trial.watch, event.why))
-    settled = watching.settle(trial.watch, event.now_s, trial.plan, commanded=trial.takeoff is not None)
+        trial = replace(trial, watch=trial.watch.note_duplicate(event.why))
+    settled = trial.watch.settle(event.now_s, trial.plan, commanded=trial.takeoff is not None)
     trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
     trial, polls = _poll_settings(trial, event.now_s)
@@ -101,7 +93,7 @@ def _confirm_take_off(trial: Trial, event: Event) -> Step:
 
 
 def _process_packet(trial: Trial, event: PacketReceived) -> Step:
-    watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan)
+    watch, positions = trial.watch.update(event.measurement, event.now_s, trial.plan)
     trial = _with_disarmed_height(trial, watch, event.now_s)
     trial, requests = _check_settings(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.identity.rebooted:
@@ -109,7 +101,7 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     if trial.state is State.ARM:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
     elif trial.state is State.RECORD:
-        trial = set_point_schedule.note_settling(trial, positions) if positions else trial
+        trial = set_point_schedule.note_settling(trial, positions)
         trial = _with_target(trial, event) if trial.plan.holds_first else trial
     to_m = trial.plan.ground_m if trial.state not in STATES_WITH_TRIAL_GAINS else trial.plan.set_point_m
     samples = (RecordSample(each, to_m, watch.battery.voltage_v, watch.second.altitude_m) for each in positions)
@@ -121,25 +113,22 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
     so for the first time."""
     if not isinstance(measurement, Parameter) or trial.state not in {State.ARM, *STATES_WITH_TRIAL_GAINS}:
         return trial, ()
-    suspects = trial.settings.suspects
     settings, finding = trial.settings.update(measurement, trial.plan)
-    trial = replace(trial, settings=settings)
-    is_new = len(settings.suspects) > len(suspects)
-    return trial if finding is None else note(trial, finding), (RequestGain(measurement.name),) if is_new else ()
+    is_new = len(settings.suspects) > len(trial.settings.suspects)
+    return note(replace(trial, settings=settings), finding), (RequestGain(measurement.name),) if is_new else ()
 
 
 def _with_target(trial: Trial, event: PacketReceived) -> Trial:
     """Note that the vehicle follows another set point than it was commanded to."""
     set_points, finding = trial.set_points.update(event.measurement, event.now_s, trial.plan)
-    trial = trial if set_points is trial.set_points else replace(trial, set_points=set_points)
-    return trial if finding is None else note(trial, finding)
+    return note(replace(trial, set_points=set_points), finding)
 
 
 def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -> Trial:
     """Note the height of a vehicle in the air whose heartbeats begin to report that its motors are off."""
     if watch.modes.armed == trial.watch.modes.armed or trial.state not in _FLOWN:
         return trial
-    is_up = watch.positions.is_fresh(now_s) and not watch.ground.reports_landing(now_s)
+    is_up = watch.positions.is_fresh(now_s) and not watch.ground.reports(now_s, landed=True)
     height_m = watch.positions.height_m(trial.plan.ground_m) if is_up and not watch.modes.armed else None
     return replace(trial, disarmed_m=height_m or 0.0)
 
@@ -149,8 +138,7 @@ def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
     is_unchanged = watch.modes is trial.watch.modes
     if is_unchanged or trial.state not in STATES_WITH_TRIAL_GAINS or not allowed_modes(trial):
         return trial
-    finding = watch.modes.find_interruption(trial.watch.modes, trial.plan)
-    return trial if finding is None else note(trial, finding)
+    return note(trial, watch.modes.find_interruption(trial.watch.modes, trial.plan))
 
 
 def _with_fall(trial: Trial, now_s: float) -> Trial:
@@ -181,11 +169,9 @@ def _with_drift(trial: Trial, now_s: float) -> Trial:
         return trial
     watch, plan = trial.watch, trial.plan
     is_told_to_land = trial.state not in STATES_WITH_TRIAL_GAINS
-    has_landed = is_told_to_land and watching.has_reported_landing(watch, now_s, plan)
-    drift = watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed)
-    trial = trial if drift is None else note_cause(trial, drift)
-    contradiction = watch.ground.find_contradiction(now_s)
-    return trial if contradiction is None else note(trial, contradiction)
+    has_landed = is_told_to_land and watch.has_reported_landing(now_s, plan)
+    trial = note_cause(trial, watch.positions.find_drift(now_s, plan.ground_m, has_landed=has_landed))
+    return note(trial, watch.ground.find_contradiction(now_s))
 
 
 def _with_jump(trial: Trial) -> Trial:

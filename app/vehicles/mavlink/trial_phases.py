@@ -5,7 +5,6 @@ from typing import Final
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink import set_point_schedule
 from app.vehicles.mavlink.events import (
     ActionDone,
@@ -16,22 +15,19 @@ from app.vehicles.mavlink.events import (
     SetPointsPaused,
     WithdrawSetPoint,
 )
-from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.monitors.positions import DRIFT_M
+from app.vehicles.mavlink.failures import DRIFT_M, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_findings import (
+from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
+from app.vehicles.mavlink.trial_reactions import (
     MODE_KNOWN_S,
+    enter,
+    fail,
     find_in_flight,
     find_noted,
     is_by_hand,
-    may_be_by_hand,
-)
-from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
-from app.vehicles.mavlink.trial_reactions import (
-    enter,
-    fail,
     land,
+    may_be_by_hand,
     measure_ground,
     note,
 )
@@ -56,18 +52,19 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, arm_sent_s=now_s)
     if trial.watch.modes.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
-    if isinstance(event, ActionRefused):
-        return fail(measure_ground(trial, now_s), Finding(Failure.NOT_ARMED, event.why), now_s)
-    if finding := find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED):
-        return fail(measure_ground(trial, now_s), finding, now_s)
-    if finding := watching.find_on_ground(trial.watch, trial.plan, now_s) or _not_armed(trial, event):
+    if finding := (
+        (Finding(Failure.NOT_ARMED, event.why) if isinstance(event, ActionRefused) else None)
+        or find_noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED)
+        or trial.watch.find_on_ground(trial.plan, now_s)
+        or _not_armed(trial, event)
+    ):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    trial = measure_ground(replace(trial, watch=watching.begin_climb(trial.watch, last.altitude_m)), now_s)
+    trial = measure_ground(replace(trial, watch=trial.watch.begin_climb(last.altitude_m)), now_s)
     watch, plan = trial.watch, trial.plan
-    stands = watching.stands_by_own_account(watch, now_s, plan)
+    stands = watch.stands_by_own_account(now_s, plan)
     if finding := (
         watch.positions.find_departure(plan.ground_m, stands=stands)
         or watch.second.find_disagreement_on_ground(last.altitude_m, trial.ground_shift_m, now_s)
@@ -120,7 +117,7 @@ def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
     decides_soon = not watch.modes.armed or watch.positions.unchanged_s > _STUCK_S
     if _waited_s(trial) <= lift_off_s or decides_soon or not watch.positions.is_fresh(now_s):
         return None
-    if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
+    if trial.watch.is_said_to_fly(now_s, trial.plan.ground_m):
         return Finding(Failure.LOST_POSITION, "It reports that it flies, but its altitude stayed on the ground.")
     return Finding(Failure.NO_LIFT_OFF, f"It was still on the ground {lift_off_s:g} s after the command.")
 
@@ -156,15 +153,16 @@ def _record(trial: Trial, event: Event) -> Step:
         trial.settings.find_unconfirmed() or watch.climb.find_sunken(watch.last, lowest_m, plan.ground_m),
         watch.climb.find_incomplete(plan.climb_to_m) if plan.autopilot.climbs_from_ground else None,
     ):
-        trial = trial if finding is None else note(trial, finding)
-    return land(trial, State.LAND, now_s)
+        trial = note(trial, finding)
+    return land(trial, now_s, State.LAND)
 
 
 def _may_have_stayed(trial: Trial, now_s: float) -> bool:
     """Whether its landed state has always been that it stands since the command, and its altitude has not been higher
     than one may shift as the motors start."""
     watch = trial.watch
-    stood = watch.ground.has_stood_since(now_s if trial.takeoff is None else trial.takeoff.at_s)
+    since_s = now_s if trial.takeoff is None else trial.takeoff.at_s
+    stood = watch.ground.landed is True and watch.ground.landed_since_s <= since_s
     return stood and watch.climb.highest_m - trial.plan.ground_m <= DRIFT_M
 
 
@@ -177,7 +175,7 @@ def _withdraw(trial: Trial, now_s: float) -> Step:
     if is_by_hand(trial):
         return trial, ()
     why = "A heartbeat reported a manual mode, so that no further set point was commanded."
-    return land(note(trial, Finding(Failure.INTERRUPTED, why)), State.ABORT_LAND, now_s)
+    return land(note(trial, Finding(Failure.INTERRUPTED, why)), now_s)
 
 
 def _change_set_point(trial: Trial, event: Event) -> Step | None:
@@ -194,7 +192,7 @@ def _change_set_point(trial: Trial, event: Event) -> Step | None:
     if not set_point_schedule.is_due(trial, now_s) or may_be_by_hand(trial, now_s):
         return (trial, ()) if is_confirmed else None
     if trial.failure is not None:
-        return land(trial, State.ABORT_LAND, now_s)
+        return land(trial, now_s)
     finding = set_point_schedule.find_unsettled(trial)
     return set_point_schedule.command_next(trial) if finding is None else fail(trial, finding, now_s)
 

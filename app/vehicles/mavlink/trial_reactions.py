@@ -1,22 +1,30 @@
-"""Transitions between the states of a trial with their commands, as pure functions of a trial and the time.
-`trial_phases` decides when each is made.
+"""Findings of a trial from the takeoff command on, the most severe one first, and the transitions between its states
+with their commands, as pure functions of a trial and the time. `trial_phases` decides when each is made.
 """
 
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
 from app.autopilots.commands import Action
-from app.autopilots.measurements import Parameter, Position
-from app.vehicles.end_texts import request_text
-from app.vehicles.flight_end import Landing, StopRequest
-from app.vehicles.mavlink import observation as watching
+from app.autopilots.measurements import Parameter
+from app.vehicles.flight_end import Landing, StopRequest, request_text
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
-from app.vehicles.mavlink.failures import GAIN_FAILURES, GROUND_M, RESPONSES, Failure, Finding, Reaction
-from app.vehicles.mavlink.states import replace
-from app.vehicles.mavlink.trial_state import TRANSITIONS, SafeGainsSent, State, Step, Trial
+from app.vehicles.mavlink.failures import GROUND_M, RESPONSES, Failure, Finding, Reaction
+from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.trial_state import (
+    STATES_WITH_TRIAL_GAINS,
+    TRANSITIONS,
+    SafeGainsSent,
+    State,
+    Step,
+    Trial,
+)
 
+MODE_KNOWN_S: Final = 1.0
+"""Time after a command in which heartbeats may still show the mode and block of before."""
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
 _IN_PLACE_M: Final = 0.3
@@ -28,48 +36,134 @@ _CLIMBED_M: Final = 0.1
 """A vehicle that has climbed by less than this, by its climb rate, has not moved."""
 
 
+def find_in_flight(trial: Trial, now_s: float) -> Finding | None:
+    """Return the most severe failure between the command and the end of the record, if any."""
+    watch, plan, modes = trial.watch, trial.plan, allowed_modes(trial)
+    return (
+        (watch.modes.find_taken_over(plan) if modes else None)
+        or watch.identity.find_reboot()
+        or watch.modes.find_disarming()
+        or watch.modes.find_unexpected(plan, modes, _allowed_blocks(trial))
+        or find_noted(trial, Failure.UNEXPECTED, Failure.LOST_POSITION)
+        or (watch.climb.find_interrupted(watch.modes.agreed, plan) if modes else None)
+        or watch.identity.find_duplicate()
+        or watch.link.find(plan, watch.modes.heartbeat_s, now_s)
+        or watch.positions.find_jump()
+        or watch.envelope.find(plan, watch.last, settling=True)
+        or watch.modes.find_own_landing(plan, watch.last, mode_known=bool(modes))
+        or watch.find_frozen(plan, now_s)
+        or watch.find_lost_position(plan, now_s)
+        or watch.second.find_disagreement()
+        or watch.battery.find(now_s)
+    )
+
+
+def find_noted(trial: Trial, *failures: Failure) -> Finding | None:
+    """Return the trial's failure if it is one of these, which end the record."""
+    return Finding(trial.failure, trial.why) if trial.failure in failures else None
+
+
+def find_taken_over(trial: Trial) -> Finding | None:
+    """Whether a pilot has taken over, by heartbeats sent certainly after the command."""
+    return trial.watch.modes.find_taken_over(trial.plan) if allowed_modes(trial) else None
+
+
+def find_change(trial: Trial) -> Finding | None:
+    """Return an unexpected change of state during a landing, in which disarming is expected."""
+    watch = trial.watch
+    return (
+        watch.identity.find_duplicate()
+        or watch.identity.find_reboot()
+        or watch.modes.find_unexpected(trial.plan, allowed_modes(trial), _allowed_blocks(trial))
+    )
+
+
+def is_by_hand(trial: Trial) -> bool:
+    """Whether the newest heartbeat shows a manual mode."""
+    modes = trial.watch.modes
+    return modes.armed and trial.plan.is_manual(modes.mode) and bool(allowed_modes(trial))
+
+
+def may_be_by_hand(trial: Trial, now_s: float) -> bool:
+    """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
+    return is_by_hand(trial) and now_s - trial.watch.modes.heartbeat_s < trial.plan.confirmation_s
+
+
+def allowed_modes(trial: Trial) -> frozenset[str]:
+    """Return the modes that the vehicle may be in. Any (empty) until a heartbeat sent certainly after the command, and
+    while the vehicle stays in its previous mode, because it has not executed the command then."""
+    seen = trial.watch.modes
+    if trial.takeoff is not None:
+        command_s = trial.takeoff.at_s
+        has_stayed = not trial.watch.climb.lifted and seen.mode_since_s <= command_s + MODE_KNOWN_S
+        has_stayed = has_stayed and seen.mode == trial.takeoff.mode
+    elif trial.state is State.ABORT_LAND:
+        command_s = trial.since_s
+        has_stayed = seen.mode_since_s <= command_s
+    else:
+        return frozenset()
+    if has_stayed or seen.heartbeat_s - command_s < MODE_KNOWN_S:
+        return frozenset()
+    return _flying_modes(trial) | trial.plan.autopilot.landing_modes
+
+
+def _flying_modes(trial: Trial) -> frozenset[str]:
+    """Return the modes that it may fly in: those in which it follows set points only from the first on, and no others
+    once it has confirmed that, until it is commanded to land."""
+    autopilot = trial.plan.autopilot
+    if not (trial.plan.holds_first and trial.set_points.has_begun):
+        return autopilot.flying_modes
+    if trial.set_points.changes and trial.state is State.RECORD:
+        return autopilot.following_modes
+    return autopilot.flying_modes | autopilot.following_modes
+
+
+def _allowed_blocks(trial: Trial) -> frozenset[str]:
+    """Return the blocks of its flight plan that the vehicle may be in. At first it may still report the previous ones,
+    and some plans return to them after the landing."""
+    autopilot = trial.plan.autopilot
+    allowed = autopilot.flying_blocks | autopilot.landing_blocks
+    early = trial.takeoff is None or trial.watch.modes.block_s - trial.takeoff.at_s < MODE_KNOWN_S
+    return allowed | autopilot.arming_blocks if early or trial.state not in STATES_WITH_TRIAL_GAINS else allowed
+
+
 def measure_ground(trial: Trial, now_s: float) -> Trial:
     """Return the trial with the ground where the vehicle stands now, because its altitude shifts as its motors start,
     and is reset by an autopilot that counts from the ground. If it may have moved, the ground is unchanged."""
     watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
     stood = samples[len(samples) // 2 :]
-    if not stood or watch.positions.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
+    if not stood or watch.positions.doubted or watch.is_said_to_fly(now_s, plan.ground_m):
         return trial
     altitudes_m = [position.altitude_m for position in stood]
     is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
     is_in_place = stood[-1].away_m(watch.envelope.origin or stood[-1]) <= _IN_PLACE_M
     shift_m = statistics.median(altitudes_m) - plan.ground_m
     may_shift = plan.autopilot.climbs_from_ground or abs(shift_m) <= _SHIFT_M
-    if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
+    climbed_m = sum(
+        after.climb_rate_m_s * (after.time_boot_s - before.time_boot_s) for before, after in pairwise(samples)
+    )
+    if not (is_still and is_in_place and may_shift and abs(climbed_m) <= _CLIMBED_M):
         return trial
     return replace(
         trial,
         plan=plan.on_ground_at(plan.ground_m + shift_m),
-        watch=watching.reset_altitude(watch),
+        watch=watch.reset_altitude(),
         ground_shift_m=shift_m,
         ground_samples=(),
     )
 
 
-def _climbed_m(samples: Sequence[Position]) -> float:
-    """Return the climb by climb rate alone, m."""
-    return sum(later.climb_rate_m_s * (later.time_boot_s - earlier.time_boot_s) for earlier, later in pairwise(samples))
-
-
 def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     """Make the transition for a failure, from a state in which the vehicle can be commanded."""
     trial = note(trial, finding)
-    if trial.state is State.ARM:
-        return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else _abort_landing(trial, now_s)
     reaction = RESPONSES[finding.failure].reaction
+    if trial.state is State.ARM:
+        return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else land(trial, now_s)
     if reaction == "cease":
         return quarantine(trial, finding.why, now_s)
     if trial.state in (State.ABORT_LAND, State.LINK_LOST):
-        return (
-            abort_with_safe_gains(trial, now_s)
-            if finding.failure in GAIN_FAILURES and trial.safe_gains is None
-            else (trial, ())
-        )
+        is_suspect = reaction == "land, gains first" and trial.safe_gains is None
+        return abort_with_safe_gains(trial, now_s) if is_suspect else (trial, ())
     return _REACTIONS[reaction](trial, now_s)
 
 
@@ -81,12 +175,11 @@ def _give_up_take_off(trial: Trial, now_s: float) -> Step:
     return disarm(trial, now_s) if stands else abort(trial, now_s)
 
 
-def _abort_landing(trial: Trial, now_s: float) -> Step:
-    return land(trial, State.ABORT_LAND, now_s)
-
-
-def note(trial: Trial, finding: Finding) -> Trial:
-    """Note a failure: the first one is the trial's; one that calls for quarantine is also kept as `doubt`."""
+def note(trial: Trial, finding: Finding | None) -> Trial:
+    """Note a failure, if there is one: the first is the trial's; one that calls for quarantine is also kept as
+    `doubt`."""
+    if finding is None:
+        return trial
     if RESPONSES[finding.failure].outcome == "quarantine" and not trial.doubt:
         trial = replace(trial, doubt=finding.why)
     if trial.failure is not None:
@@ -95,9 +188,10 @@ def note(trial: Trial, finding: Finding) -> Trial:
     return replace(trial, failure=finding.failure, request=finding.request, remarks=remarks)
 
 
-def note_cause(trial: Trial, finding: Finding) -> Trial:
-    """Note a failure that explains why a limit was exceeded: that does not count against the gains."""
-    return note(replace(trial, failure=None) if trial.failure is Failure.ENVELOPE else trial, finding)
+def note_cause(trial: Trial, finding: Finding | None) -> Trial:
+    """Note a failure that explains why a limit was exceeded, if there is one: that does not count against the gains."""
+    is_explained = finding is not None and trial.failure is Failure.ENVELOPE
+    return note(replace(trial, failure=None) if is_explained else trial, finding)
 
 
 def enter(trial: Trial, state: State, now_s: float) -> Trial:
@@ -117,7 +211,7 @@ def abort_with_safe_gains(trial: Trial, now_s: float) -> Step:
     return replace(trial, safe_gains=sent), (SendGain(first),)
 
 
-def land(trial: Trial, state: State, now_s: float) -> Step:
+def land(trial: Trial, now_s: float, state: State = State.ABORT_LAND) -> Step:
     """Command Land and enter `state`, which repeats it."""
     return replace(enter(trial, state, now_s), repeated_s=now_s), (PerformAction(Action.LAND),)
 
@@ -132,7 +226,7 @@ def disarm(trial: Trial, now_s: float) -> Step:
 
 def find_doubt_of_ground(trial: Trial, now_s: float) -> str:
     """Return why its motors may not be stopped without a request of a person; empty if they may."""
-    return find_doubt_of_descent(trial, now_s) or watching.find_doubt_of_ground(trial.watch, now_s)
+    return find_doubt_of_descent(trial, now_s) or trial.watch.find_doubt_of_ground(now_s)
 
 
 def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
@@ -144,7 +238,7 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     if trial.takeoff is None:
         return ""
     if landed_blocks or watch.ground.landed is not None:
-        has_landed = watch.modes.block in landed_blocks if landed_blocks else watch.ground.reports_landing(now_s)
+        has_landed = watch.modes.block in landed_blocks if landed_blocks else watch.ground.reports(now_s, landed=True)
         return "" if has_landed else "it has not reported a landing, and an altitude may drift"
     return "" if watch.climb.lifted and watch.climb.unseen_m is None else "its descent was not observed"
 
@@ -172,14 +266,14 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
     or it has not been commanded to take off and nothing shows that it moved."""
     watch, ground_m = trial.watch, trial.plan.ground_m
-    stands = watching.stands_by_own_account(watch, now_s, trial.plan)
-    is_arming = trial.state is State.ARM and not watching.is_said_to_fly(watch, now_s, ground_m)
+    stands = watch.stands_by_own_account(now_s, trial.plan)
+    is_arming = trial.state is State.ARM and not watch.is_said_to_fly(now_s, ground_m)
     if trial.takeoff is None and (stands or is_arming):
         return ""
     if watch.positions.is_airborne(now_s, ground_m):
         height_m = watch.positions.height_m(ground_m)
         return f"The vehicle was {height_m:.1f} m above the ground: inspect it before it flies again."
-    if watch.positions.is_grounded(now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
+    if watch.positions.is_grounded(now_s, ground_m) and not watch.is_said_to_fly(now_s, ground_m):
         return ""
     return "The vehicle was not known to be on the ground: inspect it before it flies again."
 
@@ -229,8 +323,8 @@ def send_gains(trial: Trial, sent: SafeGainsSent, event: Event) -> Step:
 
 _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
     "land, gains first": abort,
-    "land": _abort_landing,
-    "repeat land": lambda trial, now_s: land(trial, State.LINK_LOST, now_s),
+    "land": land,
+    "repeat land": partial(land, state=State.LINK_LOST),
     "disarm": _give_up_take_off,
 }
 """Transition for each reaction of `RESPONSES`, for a vehicle that has been commanded to take off."""

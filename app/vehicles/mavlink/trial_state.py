@@ -1,18 +1,16 @@
 """State of one trial on a MAVLink vehicle: its states, and what is known of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
 from app.autopilots.commands import Setting
 from app.autopilots.measurements import Position
-from app.vehicles.end_texts import joined, request_text
-from app.vehicles.flight_end import Landing, StopRequest
+from app.vehicles.flight_end import Landing, StopRequest, joined, request_text
 from app.vehicles.mavlink.events import Command
 from app.vehicles.mavlink.failures import RESPONSES, Failure, Outcome
-from app.vehicles.mavlink.monitors.set_points import SetPointMonitor
-from app.vehicles.mavlink.monitors.settings import SettingMonitor
+from app.vehicles.mavlink.monitors.commanded import SetPointMonitor, SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 
@@ -120,8 +118,8 @@ class Trial:
     state: State
     since_s: float
     watch: TrialObservation
-    settings: SettingMonitor
-    set_points: SetPointMonitor
+    settings: SettingMonitor = field(default_factory=SettingMonitor)
+    set_points: SetPointMonitor = field(default_factory=SetPointMonitor)
     failure: Failure | None = None
     request: StopRequest | None = None
     remarks: tuple[str, ...] = ()

@@ -12,15 +12,14 @@ from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
-from app.vehicles.end_texts import cause_text
-from app.vehicles.flight_end import FlightEnd, Landing, withdrawn_by
-from app.vehicles.mavlink import observation as watching
+from app.vehicles.flight_end import FlightEnd, Landing, cause_text, withdrawn_by
 from app.vehicles.mavlink import on_ground, parameters, preflight, records
 from app.vehicles.mavlink.connection import VehicleConnection
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
-from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference, with_flown_set_points
+from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.records import Reference, simulate_reference, with_flown_set_points
 from app.vehicles.mavlink.sent_commands import RepeatedCommand, set_up
 from app.vehicles.mavlink.set_point_schedule import referred_from_s, with_hold
 from app.vehicles.mavlink.transports import LinkError
@@ -215,7 +214,7 @@ class MavlinkVehicle(VehicleConnection):
         self._quarantine.enter(State.ARM)
         plan = self._plan(order, ground)
         self._gains.staged = self._repeated = None
-        watch = watching.begin(
+        watch = TrialObservation.begin(
             self._radio.clock.now_s(),
             last=last,
             battery_v=self._radio.seen.battery_v,

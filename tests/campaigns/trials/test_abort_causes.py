@@ -9,8 +9,7 @@ from fastapi.testclient import TestClient
 from app.db.models import TrialRow
 from app.db.session import Database
 from app.flights.record_spool import Spool
-from app.vehicles.end_texts import FAILURE_TEXTS
-from app.vehicles.flight_end import Failure, FlightEnd, StopRequest
+from app.vehicles.flight_end import FAILURE_TEXTS, Failure, FlightEnd, StopRequest
 from tests.builders import (
     Json,
     create_flown_campaign,

@@ -6,8 +6,7 @@ import pytest
 
 from app.autopilots.commands import Action
 from app.autopilots.measurements import BlockEntered
-from app.vehicles.end_texts import FAILURE_TEXTS, request_text
-from app.vehicles.flight_end import GainsLeft, StopRequest
+from app.vehicles.flight_end import FAILURE_TEXTS, GainsLeft, StopRequest, request_text
 from app.vehicles.mavlink.events import ActionDone, SecondaryAltitudeReceived, StopRequested
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import end_of, ending_of

@@ -12,7 +12,6 @@ from app.autopilots.measurements import Position
 from app.autopilots.registry import AUTOPILOTS
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     ActionDone,
     Command,
@@ -25,6 +24,7 @@ from app.vehicles.mavlink.events import (
     Tick,
 )
 from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import advance, begin
 from app.vehicles.mavlink.trial_state import State, Trial
@@ -67,7 +67,7 @@ class Replay:
         self.told: list[tuple[float, Command]] = []
         self.states = [State.ARM]
         self.trial: Trial
-        self.trial, _ = begin(plan, watching.begin(arming, last=positions[-1], battery_v=12.4), arming)
+        self.trial, _ = begin(plan, TrialObservation.begin(arming, last=positions[-1], battery_v=12.4), arming)
         self.give(ActionDone(Action.ARM, arming))
 
     def run(self) -> None:
@@ -169,7 +169,9 @@ def heard(log: str, autopilot: str) -> list[PacketReceived]:
 def follow(plan: Plan, packets: list[PacketReceived], armed_s: float) -> tuple[Trial, list[Action]]:
     """Begin a trial at the last position before `armed_s`, and hear the rest."""
     before = [each.measurement for each in packets if each.now_s < armed_s and isinstance(each.measurement, Position)]
-    trial, commands = begin(plan, watching.begin(armed_s, last=before[-1], battery_v=12.4, stood_s=1.0), armed_s)
+    trial, commands = begin(
+        plan, TrialObservation.begin(armed_s, last=before[-1], battery_v=12.4, stood_s=1.0), armed_s
+    )
     told = list(commands)
     events: list[Event] = [ActionDone(Action.ARM, armed_s)]
     events += [event for each in packets if each.now_s >= armed_s for event in (each, Tick(each.now_s))]

@@ -9,15 +9,15 @@ import pytest
 from app.autopilots.commands import Action
 from app.autopilots.measurements import Parameter, Position
 from app.autopilots.registry import AUTOPILOTS
-from app.vehicles.mavlink.boot_clock import OtherClock
 from app.vehicles.mavlink.events import ActionDone, ActionRefused, SetPointsPaused
 from app.vehicles.mavlink.failures import Finding
+from app.vehicles.mavlink.monitors.clock import OtherClock
 from app.vehicles.mavlink.monitors.modes import ModeMonitor
 from app.vehicles.mavlink.trial_state import State
 from tests.vehicles.mavlink import test_trial_machine as befall
 from tests.vehicles.mavlink.monitors.observing import watch_of
-from tests.vehicles.mavlink.monitors.test_second_source import seen
-from tests.vehicles.mavlink.monitors.test_settings import reported
+from tests.vehicles.mavlink.monitors.test_altitude import seen
+from tests.vehicles.mavlink.monitors.test_commanded import reported
 from tests.vehicles.mavlink.test_interventions import COPTER, PX4
 from tests.vehicles.mavlink.test_set_point_schedule import STEPS, Stepping, climbing, hovering, unconfirmed
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, TrialDriver

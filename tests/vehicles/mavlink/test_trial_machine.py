@@ -19,8 +19,6 @@ from app.autopilots.measurements import (
     Position,
 )
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     ActionDone,
     ActionRefused,
@@ -33,6 +31,8 @@ from app.vehicles.mavlink.events import (
     StopRequested,
 )
 from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.monitors.clock import WRAP_S
+from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import begin
 from app.vehicles.mavlink.trial_state import State
@@ -858,7 +858,7 @@ def test_a_lost_report_of_the_landing_block_is_caught_up_by_another_land() -> No
 def test_a_landed_state_that_was_heard_before_the_trial_only_is_missed() -> None:
     walk = TrialDriver(without_landed_state=True)
     here = Position(walk.boot_s, GROUND_M, 0.0)
-    watch = watching.begin(walk.now_s, last=here, battery_v=12.4, stood_s=1.0, reports_landing=True)
+    watch = TrialObservation.begin(walk.now_s, last=here, battery_v=12.4, stood_s=1.0, reports_landing=True)
     walk.trial, _ = begin(walk.plan, watch, walk.now_s)
     walk.land().touch_down()
     assert walk.state is State.QUARANTINE

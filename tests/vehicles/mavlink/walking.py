@@ -18,8 +18,6 @@ from app.autopilots.measurements import (
     Position,
 )
 from app.autopilots.registry import AUTOPILOTS
-from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     ActionDone,
     Command,
@@ -32,6 +30,8 @@ from app.vehicles.mavlink.events import (
     SendGain,
     Tick,
 )
+from app.vehicles.mavlink.monitors.clock import WRAP_S
+from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.trial_machine import advance, begin
 from app.vehicles.mavlink.trial_state import State, Trial
@@ -103,7 +103,7 @@ class TrialDriver:
         here = Position(self.boot_s, self.altitude_m, 0.0)
         self._asked: list[str] = []
         self.trial: Trial
-        watch = watching.begin(self.now_s, last=here, battery_v=self.voltage_v, stood_s=1.0)
+        watch = TrialObservation.begin(self.now_s, last=here, battery_v=self.voltage_v, stood_s=1.0)
         self.trial, commands = begin(self.plan, watch, self.now_s)
         self._note(commands)
 

@@ -1,33 +1,92 @@
-"""The vehicle's clock: whether it advances, steps or restarts, and how late its positions arrive."""
+"""The link and the vehicle's clock, its time since boot: whether packets arrive, whether the clock advances, steps or
+restarts, and how late its positions arrive.
 
+Packets may be late, repeated, in any order, or corrupted: a single one by another clock says nothing. Another clock
+that goes on by itself is the sign of a restart.
+"""
+
+import dataclasses
 from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.boot_clock import (
-    AHEAD_S,
-    BACK_S,
-    EARLY_S,
-    RESTARTED_S,
-    STEPPED_S,
-    OtherClock,
-    may_have_begun,
-)
-from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding
+from app.vehicles.mavlink.plan import Plan, replace, since
 
+AHEAD_S: Final = 2.0
+"""Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
+_EARLY_S: Final = 0.1
+"""Most by which a position may be ahead of the vehicle's clock as it is known by those before it."""
+_STEPPED_S: Final = 0.1
+"""Time for which positions that are ahead go on alone before their clock is the vehicle's."""
+BACK_S: Final = 1.0
+"""If the clock goes back by less than this, the packet was late."""
+RESTARTED_S: Final = 0.4
+"""Time for which another clock goes on alone before it is the vehicle's."""
+WRAP_S: Final = 2.0**32 / 1000.0
+"""After this time, 49.7 days, `time_boot_ms` begins at 0 again."""
+DRIFT: Final = 0.1
+"""Share by which the vehicle's clock may be slower than ours."""
+_SAME_CLOCK_S: Final = 0.5
+_NEAR_WRAP_S: Final = 60.0
+SILENT_S: Final = 1.0
 FRESH_S: Final = 0.5
 """Greatest age of a sample, since it was sent, that counts as the current position."""
 ATTENDED_S: Final = 0.1
 """Longest time before a packet or a sample that it accounts for: delayed by a stall, they may arrive at once, in any
 order."""
-_DRIFT: Final = 0.1
-"""Share by which the vehicle's clock may be slower than ours."""
 STUCK_S: Final = 0.25
 LOST_S: Final = 0.5
 _LONGEST_STEP_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkMonitor:
+    """`received_s` is the time of the last packet."""
+
+    received_s: float
+
+    def find(self, plan: Plan, heartbeat_s: float, now_s: float) -> Finding | None:
+        """Find a lost link; `heartbeat_s` is the time of the last heartbeat."""
+        silent_s = SILENT_S * plan.timeout_factor
+        if now_s - self.received_s > silent_s:
+            return Finding(Failure.LINK, f"Nothing was received for more than {silent_s:g} s.")
+        if now_s - heartbeat_s > HEARTBEATS_MISSED * plan.heartbeat_s:
+            return Finding(Failure.LINK, "Three heartbeats were missed.")
+        return None
+
+
+def unwrapped(position: Position, newest: Position | None) -> Position:
+    """Return the position with a time that continues that of the newest one beyond WRAP_S."""
+    near_wrap = newest is not None and newest.time_boot_s > WRAP_S - _NEAR_WRAP_S
+    is_wrapped = near_wrap and position.time_boot_s < _NEAR_WRAP_S
+    return dataclasses.replace(position, time_boot_s=position.time_boot_s + WRAP_S) if is_wrapped else position
+
+
+def may_have_begun(time_boot_s: float, passed_s: float) -> bool:
+    """Whether a clock with this time can have begun in the `passed_s` since the vehicle was last heard."""
+    return time_boot_s <= (1.0 + DRIFT) * passed_s + AHEAD_S
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OtherClock:
+    """Positions by a clock other than the vehicle's so far: the first at `first_s` by our clock, the last at
+    `last_s`."""
+
+    first_s: float
+    last_s: float
+    last: Position
+
+    @property
+    def advances(self) -> bool:
+        """Whether more than one position is by this clock."""
+        return self.last_s > self.first_s
+
+    def goes_on(self, position: Position, now_s: float) -> bool:
+        """Whether the position is by this clock."""
+        gained_s = position.time_boot_s - self.last.time_boot_s
+        return gained_s > 0.0 and abs(gained_s - (now_s - self.last_s)) < _SAME_CLOCK_S
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,17 +105,14 @@ class ClockMonitor:
 
     def continues(self, position: Position, newest: Position, now_s: float) -> bool:
         """Whether the position's time is neither late, repeated nor ahead, after the `newest` position."""
-        return position.time_boot_s > newest.time_boot_s and self._early_s(position, newest, now_s) <= EARLY_S
+        return position.time_boot_s > newest.time_boot_s and self._early_s(position, newest, now_s) <= _EARLY_S
 
     def advance(self, position: Position, now_s: float) -> "ClockMonitor":
         """Note a position that continues the clock: the least latency, and since when positions are late."""
-        offset_s, least_s, late_since_s = now_s - position.time_boot_s, self.least_offset_s, None
-        if least_s is None:
-            least_s = offset_s
-        else:
-            least_s = min(offset_s, least_s + _DRIFT * (now_s - self.advanced_s))
-            if offset_s - least_s >= FRESH_S:
-                late_since_s = self.late_since_s if self.late_since_s is not None else now_s
+        offset_s = least_s = now_s - position.time_boot_s
+        if self.least_offset_s is not None:
+            least_s = min(offset_s, self.least_offset_s + DRIFT * (now_s - self.advanced_s))
+        late_since_s = since(self.late_since_s, now_s, holds=offset_s - least_s >= FRESH_S)
         return replace(self, advanced_s=now_s, stuck_s=0.0, least_offset_s=least_s, late_since_s=late_since_s)
 
     def sent_s(self, position: Position) -> float:
@@ -74,7 +130,7 @@ class ClockMonitor:
         if not goes_on or self.advanced_s > first_s:
             return clock, False
         early_s = self._early_s(position, newest, now_s)
-        if EARLY_S < early_s <= AHEAD_S and now_s - first_s >= STEPPED_S:
+        if _EARLY_S < early_s <= AHEAD_S and now_s - first_s >= _STEPPED_S:
             step_s, offset_s = max(self.stepped_s, early_s), now_s - position.time_boot_s
             return replace(clock, stepped_s=step_s, least_offset_s=offset_s, advanced_s=now_s), False
         fell_back = position.time_boot_s < newest.time_boot_s - BACK_S

@@ -1,4 +1,5 @@
-"""Modes: who flies the vehicle and how, by its heartbeats and the blocks of its flight plan."""
+"""Who flies the vehicle and how, by its heartbeats and the blocks of its flight plan, and whether it is still the same
+one: whether two vehicles answer, or it has rebooted."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,13 +7,26 @@ from typing import Final
 from app.autopilots.measurements import Heartbeat, Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.plan import Plan, replace
 
 _IN_TURN: Final = 0.8
 """Minimum interval of one vehicle's heartbeats, in periods; closer ones are of two vehicles."""
 _OWN_CEILING_M: Final = 0.5
 """Maximum distance of a vehicle's own ceiling below ours."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentityMonitor:
+    """`duplicate_reason` is the evidence that two vehicles use its system id; empty without evidence."""
+
+    duplicate_reason: str = ""
+    rebooted: bool = False
+
+    def find_duplicate(self) -> Finding | None:
+        return Finding(Failure.DUPLICATE, self.duplicate_reason) if self.duplicate_reason else None
+
+    def find_reboot(self) -> Finding | None:
+        return Finding(Failure.UNEXPECTED, "The vehicle rebooted.") if self.rebooted else None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,19 @@
 from app.autopilots.measurements import Battery, Heartbeat, Position
-from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import START_S, failure_of, told, watch_of
 from tests.vehicles.mavlink.walking import PLAN
+
+
+def test_a_second_without_any_packet_is_a_lost_link() -> None:
+    watch = watch_of(3.0)
+    assert watch.link.find(PLAN, watch.modes.heartbeat_s, 11.0) is None
+    assert failure_of(watch.link.find(PLAN, watch.modes.heartbeat_s, 11.01)) == "F5"
+
+
+def test_any_packet_keeps_the_link_but_three_missed_heartbeats_lose_it() -> None:
+    watch = told(watch_of(3.0), None, at_s=11.7)
+    assert watch.link.find(PLAN, watch.modes.heartbeat_s, 11.74) is None
+    assert failure_of(watch.link.find(PLAN, watch.modes.heartbeat_s, 11.8)) == "F5"
 
 
 def repeated(watch: TrialObservation, *, until_s: float) -> TrialObservation:
@@ -13,26 +24,26 @@ def repeated(watch: TrialObservation, *, until_s: float) -> TrialObservation:
 
 
 def test_a_clock_that_stands_still_among_packets_is_frozen() -> None:
-    assert watching.find_frozen(repeated(watch_of(3.0), until_s=10.24), PLAN, 10.3) is None
-    assert failure_of(watching.find_frozen(repeated(watch_of(3.0), until_s=10.28), PLAN, 10.3)) == "F9a"
+    assert repeated(watch_of(3.0), until_s=10.24).find_frozen(PLAN, 10.3) is None
+    assert failure_of(repeated(watch_of(3.0), until_s=10.28).find_frozen(PLAN, 10.3)) == "F9a"
 
 
 def test_what_a_stall_delayed_may_come_in_any_order() -> None:
     watch = told(watch_of(3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.8)
-    assert watching.find_frozen(watch, PLAN, 10.3) is None
+    assert watch.find_frozen(PLAN, 10.3) is None
 
 
 def test_a_position_that_stays_away_among_other_packets_is_frozen_too() -> None:
     watch = watch_of(3.0)
     for beat in range(1, 4):
         watch = told(watch, Heartbeat(9, True, "4"), at_s=10.0 + beat * 0.5)
-    assert watching.find_frozen(watch, PLAN, 10.3) is not None
+    assert watch.find_frozen(PLAN, 10.3) is not None
 
 
 def test_silence_alone_is_not_frozen() -> None:
     watch = watch_of(3.0, 3.0)
-    watch, _ = watching.update(watch, Position(10.9, 3.0, 0.0), 10.9, PLAN)
-    assert watching.find_frozen(watch, PLAN, 10.3) is None
+    watch, _ = watch.update(Position(10.9, 3.0, 0.0), 10.9, PLAN)
+    assert watch.find_frozen(PLAN, 10.3) is None
 
 
 def test_a_packet_that_was_overtaken_is_left_out_and_a_clock_that_falls_back_is_a_reboot() -> None:

@@ -1,4 +1,4 @@
-"""The envelope: limits of altitude, speed, place, oscillation and lean, and the vehicle's own fence."""
+"""Limits of a flight: altitude, speed, place, oscillation and lean, the vehicle's own fence, and its battery."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +7,7 @@ from typing import Final
 from app.autopilots.measurements import Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
+from app.vehicles.mavlink.plan import Plan, replace, since
 
 _CLIMB_RATE_M_S: Final = 4.0
 _CROSSING_M: Final = 0.3
@@ -18,6 +17,8 @@ _LEANING_OVER_S: Final = 1.5
 _LONGEST_LEAN_S: Final = 0.5
 """Longest time for which one report of its attitude counts."""
 _LEANING: Final = 0.5
+_LOW_VOLTAGE_S: Final = 1.0
+_UNKNOWN_VOLTAGE_S: Final = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,3 +78,23 @@ class EnvelopeMonitor:
             return None
         why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
         return Finding(Failure.ENVELOPE, why)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatteryMonitor:
+    """`heard_s` is the time of the last voltage."""
+
+    heard_s: float
+    voltage_v: float | None = None
+    low_since_s: float | None = None
+
+    def update(self, voltage_v: float, now_s: float, plan: Plan) -> "BatteryMonitor":
+        low_since_s = since(self.low_since_s, now_s, holds=voltage_v < plan.min_battery_v)
+        return replace(self, heard_s=now_s, voltage_v=voltage_v, low_since_s=low_since_s)
+
+    def find(self, now_s: float) -> Finding | None:
+        if self.low_since_s is not None and now_s - self.low_since_s > _LOW_VOLTAGE_S:
+            return Finding(Failure.BATTERY, f"The battery voltage was low: {self.voltage_v:.1f} V.")
+        if now_s - self.heard_s > _UNKNOWN_VOLTAGE_S:
+            return Finding(Failure.BATTERY, f"No battery voltage was received for {_UNKNOWN_VOLTAGE_S:g} s.")
+        return None

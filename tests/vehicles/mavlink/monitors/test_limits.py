@@ -1,5 +1,4 @@
-from app.autopilots.measurements import FenceBreach, Position
-from app.vehicles.mavlink import observation as watching
+from app.autopilots.measurements import Battery, FenceBreach, Position
 from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.monitors.observing import START_S, failure_of, told, watch_of
 from tests.vehicles.mavlink.walking import PLAN
@@ -16,8 +15,8 @@ def test_the_corridor_is_measured_from_the_ground_and_speed_is_limited_in_both_d
 
 
 def test_drifting_away_is_limited() -> None:
-    watch = watching.begin(START_S, last=Position(9.98, 3.0, 0.0))
-    watch, _ = watching.update(watch, Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, PLAN)
+    watch = TrialObservation.begin(START_S, last=Position(9.98, 3.0, 0.0))
+    watch, _ = watch.update(Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, PLAN)
     assert envelope(watch) == "F6"
 
 
@@ -40,11 +39,24 @@ def test_the_vehicles_own_fence_counts() -> None:
 def test_a_speed_beyond_reason_that_lasts_is_an_abort() -> None:
     watch = watch_of(3.0, 3.0)
     for at_s, altitude_m in ((10.04, 3.14), (10.06, 3.28)):
-        watch, _ = watching.update(watch, Position(at_s, altitude_m, 7.0), at_s, PLAN)
+        watch, _ = watch.update(Position(at_s, altitude_m, 7.0), at_s, PLAN)
     assert envelope(watch) == "F6"
 
 
 def test_a_lone_speed_beyond_reason_is_no_abort() -> None:
     watch = watch_of(3.0, 3.0)
-    watch, kept = watching.update(watch, Position(10.04, 3.0, 7.0), 10.04, PLAN)
+    watch, kept = watch.update(Position(10.04, 3.0, 7.0), 10.04, PLAN)
     assert (kept, envelope(watch)) == ((), None)
+
+
+def test_a_battery_is_low_after_a_second_below_the_limit() -> None:
+    watch = told(watch_of(3.0), Battery(10.4), at_s=10.1)
+    assert watch.battery.find(11.1) is None
+    assert failure_of(watch.battery.find(11.2)) == "F7"
+    assert told(watch, Battery(10.6), at_s=10.9).battery.find(11.2) is None
+
+
+def test_a_battery_without_a_reading_for_ten_seconds_counts_as_low() -> None:
+    watch = told(watch_of(3.0), Battery(12.0), at_s=10.1)
+    assert watch.battery.find(20.0) is None
+    assert failure_of(watch.battery.find(20.2)) == "F7"

@@ -4,7 +4,7 @@ from app.autopilots.autopilot import ModeParameter
 from app.autopilots.commands import Setting
 from app.autopilots.measurements import Parameter
 from app.vehicles.mavlink.failures import Finding
-from app.vehicles.mavlink.monitors.settings import SettingMonitor
+from app.vehicles.mavlink.monitors.commanded import SettingMonitor
 from tests.vehicles.mavlink.monitors.observing import failure_of
 from tests.vehicles.mavlink.walking import PLAN, with_autopilot
 

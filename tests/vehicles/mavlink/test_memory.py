@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.boot_clock import RestartCounter
+from app.vehicles.mavlink.memory import RestartCounter
 
 AT_REST = Position(time_boot_s=0.0, altitude_m=0.0, climb_rate_m_s=0.0, east_m=0.0, north_m=0.0)
 Received = tuple[float, float]

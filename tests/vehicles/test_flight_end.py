@@ -2,8 +2,19 @@
 
 import pytest
 
-from app.vehicles.end_texts import FAILURE_TEXTS, cause_text, end_text, requested
-from app.vehicles.flight_end import Failure, FlightEnd, GainsLeft, Landing, Requester, StopRequest, not_begun
+from app.vehicles.flight_end import (
+    FAILURE_TEXTS,
+    Failure,
+    FlightEnd,
+    GainsLeft,
+    Landing,
+    Requester,
+    StopRequest,
+    cause_text,
+    end_text,
+    not_begun,
+    requested,
+)
 
 STOPPED = StopRequest(by=Requester.PROGRAM_STOPPED)
 LIMIT = FlightEnd(failure=Failure.ENVELOPE, remarks=("It rose to 4.6 m.",))
