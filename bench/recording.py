@@ -32,7 +32,7 @@ from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.on_ground import GroundObservation
+from app.vehicles.mavlink.preparation import GroundObservation
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialRunner
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

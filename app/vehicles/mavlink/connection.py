@@ -6,7 +6,7 @@ from typing import Final
 from app.autopilots.commands import Action
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, SafeGainsError, VehicleError
-from app.vehicles.mavlink import addresses, on_ground, preflight
+from app.vehicles.mavlink import addresses, preflight, preparation
 from app.vehicles.mavlink.failures import HELP
 from app.vehicles.mavlink.observed_vehicle import ObservedVehicle
 from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
@@ -79,7 +79,7 @@ class VehicleConnection(ObservedVehicle):
         so. Raises SafeGainsError if it is armed, is another one, or does not accept them; VehicleError if it does not
         report its known hardware id."""
         self._identify()
-        on_ground.require_disarmed(self._radio)
+        preparation.require_disarmed(self._radio)
         if self._identity.is_another:
             raise SafeGainsError(self.concern, hint=_ANOTHER)
         self._identity.require_uid()
@@ -136,7 +136,7 @@ class VehicleConnection(ObservedVehicle):
     def _set_up(self) -> None:
         """Set up telemetry and safe gains. Raises VehicleError if the vehicle is armed, refuses, does not accept its
         safe gains, or holds others that no person has decided to overwrite."""
-        on_ground.require_disarmed(self._radio)
+        preparation.require_disarmed(self._radio)
         self._request_telemetry()
         if self._decided:
             self.restore()
@@ -154,23 +154,23 @@ class VehicleConnection(ObservedVehicle):
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
         error. Raises LinkError if the link is closed."""
-        return self._check(on_ground.WATCHED_S)[1]
+        return self._check(preparation.WATCHED_S)[1]
 
-    def _check(self, watched_s: float) -> tuple[on_ground.GroundObservation, tuple[CheckItem, ...]]:
+    def _check(self, watched_s: float) -> tuple[preparation.GroundObservation, tuple[CheckItem, ...]]:
         radio, options = self._radio, self._options
         self._identify()
         if not radio.reports_armed and not self._quarantine.is_active:
             self._request_telemetry()
-            on_ground.make_armable(radio)
+            preparation.make_armable(radio)
         watched = self._observe_standing(watched_s)
         for _ in range(_FURTHER_OBSERVATIONS):
             if self._quarantine.is_active or not (
-                on_ground.make_armable(radio) or on_ground.set_ground_reference(radio, watched)
+                preparation.make_armable(radio) or preparation.set_ground_reference(radio, watched)
             ):
                 break
             watched = self._observe_standing(watched_s)
         if not self._quarantine.is_active:
-            on_ground.confirm_stop(radio, watched)
+            preparation.confirm_stop(radio, watched)
         minimum_v, pinned = float(options["min_battery_v"]), self._identity.pinned
         items = preflight.evaluate_items(radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if pinned is not None and pinned.uid:
@@ -183,8 +183,8 @@ class VehicleConnection(ObservedVehicle):
         items = (*items, self._gains.check())
         return watched.continued(radio), items
 
-    def _observe_standing(self, watched_s: float) -> on_ground.GroundObservation:
-        watched = on_ground.observe(self._radio, self._secondary, watched_s=watched_s)
+    def _observe_standing(self, watched_s: float) -> preparation.GroundObservation:
+        watched = preparation.observe(self._radio, self._secondary, watched_s=watched_s)
         self._identify()
         return watched
 

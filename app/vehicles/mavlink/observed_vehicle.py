@@ -17,7 +17,7 @@ from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
 from app.vehicles.mavlink.monitors.clock import RESTARTED_S
-from app.vehicles.mavlink.on_ground import ARMED
+from app.vehicles.mavlink.preparation import ARMED
 from app.vehicles.mavlink.radio import LISTEN_S, open_radio
 from app.vehicles.mavlink.sent_commands import STOPPING_S, RepeatedCommand, set_up
 from app.vehicles.mavlink.transports import LinkError, Transport

@@ -23,7 +23,8 @@ from app.vehicles.base import (
 )
 from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mavlink.monitors.clock import unwrapped
-from app.vehicles.mavlink.on_ground import (
+from app.vehicles.mavlink.parameters import read_parameter
+from app.vehicles.mavlink.preparation import (
     ARMED,
     LAND_FIRST,
     ONE_VEHICLE,
@@ -31,7 +32,6 @@ from app.vehicles.mavlink.on_ground import (
     GroundObservation,
     find_reception,
 )
-from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.radio import AutopilotLink
 
 POSITIONS_HZ: Final = 40.0

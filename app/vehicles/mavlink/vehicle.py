@@ -13,7 +13,7 @@ from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import FlightEnd, Landing, cause_text, withdrawn_by
-from app.vehicles.mavlink import on_ground, parameters, preflight, records
+from app.vehicles.mavlink import parameters, preflight, preparation, records
 from app.vehicles.mavlink.connection import VehicleConnection
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
@@ -80,7 +80,7 @@ class MavlinkVehicle(VehicleConnection):
         self._renew_telemetry()
         self._quarantine.require_none()
         self._identity.require_uid()
-        on_ground.require_disarmed(self._radio)
+        preparation.require_disarmed(self._radio)
         if self._quarantine.state is State.IDLE:
             self._quarantine.enter(State.SET_GAINS)
         try:
@@ -95,7 +95,7 @@ class MavlinkVehicle(VehicleConnection):
         self._quarantine.require_none()
         self._identify()
         self._request_telemetry()
-        watched = on_ground.observe(self._radio, self._secondary, watched_s=STANDSTILL_S)
+        watched = preparation.observe(self._radio, self._secondary, watched_s=STANDSTILL_S)
         restarted = self._gains.have_restarted
         self._identify()
         self._quarantine.require_none()
@@ -183,7 +183,7 @@ class MavlinkVehicle(VehicleConnection):
             return None
         return lambda set_points, time_s: simulate_reference(set_points, ground_m, time_s, order.record_s)
 
-    def _observe_ground(self, order: FlightOptions) -> on_ground.GroundObservation:
+    def _observe_ground(self, order: FlightOptions) -> preparation.GroundObservation:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         radio = self._radio
         further = radio.profile.set_point_requirements if _flies_steps(order) else ()
@@ -203,7 +203,7 @@ class MavlinkVehicle(VehicleConnection):
 
     def _fly(
         self,
-        ground: on_ground.GroundObservation,
+        ground: preparation.GroundObservation,
         order: FlightOptions,
         reference: Reference | None,
         on_sample: Callable[[Sample], None],
@@ -245,7 +245,7 @@ class MavlinkVehicle(VehicleConnection):
             self._keep_landing(flown.trial)
         return flown
 
-    def _plan(self, order: FlightOptions, ground: on_ground.GroundObservation) -> Plan:
+    def _plan(self, order: FlightOptions, ground: preparation.GroundObservation) -> Plan:
         """Return the plan of a flight from there, with the set points of the order."""
         profile, target = self._radio.profile, self._radio.target
         holds = _flies_steps(order) and profile.holds_first
@@ -279,7 +279,7 @@ class MavlinkVehicle(VehicleConnection):
     def _scored(self) -> records.Scored:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
-    def _record(self, flown: TrialRunner, ground: on_ground.GroundObservation) -> FlightRecord:
+    def _record(self, flown: TrialRunner, ground: preparation.GroundObservation) -> FlightRecord:
         """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
         aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
@@ -316,7 +316,7 @@ class MavlinkVehicle(VehicleConnection):
             settings={**self._options, **self._loop, **both.settings},
         )
 
-    def _not_begun(self, ground: on_ground.GroundObservation, end: FlightEnd) -> FlightRecord:
+    def _not_begun(self, ground: preparation.GroundObservation, end: FlightEnd) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         datum_m = ground.altitude_m if self._radio.profile.climbs_from_ground else 0.0

@@ -8,8 +8,8 @@ from app.autopilots.autopilot import AutopilotError, HoverLimits
 from app.autopilots.measurements import Position
 from app.autopilots.registry import AUTOPILOTS
 from app.core.models.set_points import SetPoints
-from app.vehicles.mavlink.on_ground import GroundObservation, find_reception
 from app.vehicles.mavlink.preflight import evaluate_hover, evaluate_set_points
+from app.vehicles.mavlink.preparation import GroundObservation, find_reception
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))
 STRANGE = (replace(HEARD[0], time_boot_s=3661.0), replace(HEARD[0], time_boot_s=0.2))
