@@ -25,6 +25,10 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 ATTEMPTS: Final = 2
+"""Tries of the pool, because its tasks are pure."""
+MAX_CONCURRENT: Final = 2
+WAITS_S: Final = 20.0
+"""Maximum waiting time for one of the running processes to end."""
 
 _log = structlog.get_logger(__name__)
 
@@ -125,11 +129,6 @@ def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) ->
     with suppress(EOFError, OSError):  # the parent has closed the pipe or died
         while True:
             pipe.send(perform(pipe.recv()))
-
-
-MAX_CONCURRENT: Final = 2
-WAITS_S: Final = 20.0
-"""Maximum waiting time for one of the running processes to end."""
 
 
 @dataclass(frozen=True, slots=True)
