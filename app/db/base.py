@@ -1,13 +1,12 @@
 """What the tables have in common: naming, types, states, ids, and the publication of changes."""
 
 import enum
-import re
 from collections.abc import Iterable
 from datetime import datetime
 from typing import Any, ClassVar, Final, Literal, TypeVar
 
 from sqlalchemy import JSON, CheckConstraint, Enum, MetaData
-from sqlalchemy.orm import DeclarativeBase, Mapped, Session, declared_attr, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
 from app.db.types import FlightEndJson, GainsJson, JsonObject, OptionsJson, UtcDateTime
 from app.vehicles.flight_end import FlightEnd
@@ -33,8 +32,6 @@ NEVER_REUSE_IDS: Final = {"sqlite_autoincrement": True}
 
 
 class Base(DeclarativeBase):
-    """A table, named as its class without `Row`."""
-
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
         datetime: UtcDateTime,
@@ -47,10 +44,6 @@ class Base(DeclarativeBase):
         list[list[float]]: _JSON,
         list[JsonObject]: _JSON,
     }
-
-    @declared_attr.directive
-    def __tablename__(cls) -> str:  # noqa: N805 - SQLAlchemy calls it with the class
-        return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__.removesuffix("Row")).lower()
 
 
 def is_one_of(column: str, states: Iterable[enum.StrEnum]) -> str:

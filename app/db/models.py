@@ -1,4 +1,4 @@
-"""The tables. The database checks the states too; the transitions between them are in each slice's `states.py`."""
+"""The tables. The database checks the states too; the transitions between them are in `app.common.states`."""
 
 from datetime import datetime
 
@@ -37,6 +37,7 @@ class VehicleRow(Base, Reported):
     """
 
     topic = "vehicle"
+    __tablename__ = "vehicle"
     __table_args__ = (state_check(VehicleState), NEVER_REUSE_IDS)
 
     version: Mapped[int] = mapped_column(default=1, server_default="1")
@@ -68,6 +69,7 @@ class VehicleActRow(Base, Reported):
     Written before anything is sent; except for land and motors off, which are sent at once and recorded afterwards.
     """
 
+    __tablename__ = "vehicle_act"
     __table_args__ = (
         state_check(ActState),
         state_check(ActKind, column="kind"),
@@ -108,6 +110,7 @@ class CampaignRow(Base, Reported):
     a reopening.
     """
 
+    __tablename__ = "campaign"
     __table_args__ = (
         state_check(CampaignState),
         state_check(Outcome, column="outcome"),
@@ -141,12 +144,16 @@ class CampaignRow(Base, Reported):
 class RehearsalRow(Base):
     """A campaign on a simulation that rehearses one on a real vehicle."""
 
+    __tablename__ = "rehearsal"
+
     rehearsal_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), primary_key=True)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
 
 
 class TrajectoryRow(Base, Numbered):
     """One recorded or predicted flight, packed by `app.db.trajectories`. Written once; the database refuses changes."""
+
+    __tablename__ = "trajectory"
 
     codec: Mapped[int]
     columns: Mapped[list[str]]
@@ -170,6 +177,7 @@ class TrialRow(Base, Reported):
     """
 
     topic = "trial"
+    __tablename__ = "trial"
     __table_args__ = (
         state_check(TrialState),
         CheckConstraint("state != 'valid' OR error IS NOT NULL", name="valid_is_scored"),
@@ -220,6 +228,8 @@ class TrialRow(Base, Reported):
 class TrialPhotoRow(Base, Reported):
     """A picture of a flight, as uploaded."""
 
+    __tablename__ = "trial_photo"
+
     trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="CASCADE"), index=True)
     media_type: Mapped[str]
     data: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
@@ -235,6 +245,8 @@ class ControllerCheckRow(Base, Reported):
     """A recorded controller compared with the replica, with all data of its page."""
 
     topic = "check"
+    __tablename__ = "controller_check"
+
     file_name: Mapped[str]
     kind: Mapped[str]
     passed: Mapped[bool]
@@ -253,6 +265,7 @@ class FlightRow(Base, Reported):
     """
 
     topic = "flight"
+    __tablename__ = "flight"
     __table_args__ = (
         state_check(FlightState),
         Index(
@@ -295,6 +308,8 @@ class ProposalRow(Base, Reported):
     """A strategy's proposal from one history; stale as soon as the campaign's history has another digest."""
 
     topic = "proposal"
+    __tablename__ = "proposal"
+
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     history_digest: Mapped[str]
     kind: Mapped[ProposalKind] = mapped_column(String)
@@ -320,6 +335,7 @@ class JobRow(Base, Reported):
     """
 
     topic = "job"
+    __tablename__ = "job"
     __table_args__ = (state_check(JobState), Index("ix_job_state_id", "state", "id"), NEVER_REUSE_IDS)
 
     kind: Mapped[str]
@@ -340,6 +356,8 @@ class JobRow(Base, Reported):
 
 class EventRow(Base, Numbered):
     """The outbox: what changed, in order."""
+
+    __tablename__ = "event"
 
     topic: Mapped[str]
     entity_id: Mapped[int]
