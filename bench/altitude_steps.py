@@ -20,7 +20,8 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.registry import experiment_of
-from app.core.analysis.proposal import LARGEST_ACTIVITY, RINGING_DAMPING
+from app.core.analysis.margin import RINGING_DAMPING
+from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.definition import Definition, Flight
 from app.core.errors import TrajectoryError
 from app.core.experiments.altitude_steps import AltitudeSteps

@@ -23,7 +23,8 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.registry import experiment_of
-from app.core.analysis.proposal import LARGEST_ACTIVITY, RINGING_DAMPING, damping_within_margin, least_damping
+from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
+from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.definition import Definition, Flight
 from app.core.errors import TrajectoryError
 from app.core.models.copter import filtered, motor_filter

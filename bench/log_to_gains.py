@@ -23,7 +23,8 @@ import numpy as np
 
 from app.core.analysis.analysis import Assessment, analyze
 from app.core.analysis.loop import AltitudeLoop
-from app.core.analysis.proposal import LARGEST_ACTIVITY, RINGING_DAMPING, damping_within_margin, least_damping
+from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
+from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.errors import TrajectoryError
 from app.core.records.trajectory import Samples
 from bench.copters.black_box import BUDGET, SEARCHES, best_of

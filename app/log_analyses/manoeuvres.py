@@ -9,7 +9,8 @@ from typing import Final
 
 from app.autopilots.registry import EXPERIMENTS
 from app.core.analysis.analysis import Analysis, Assessment
-from app.core.analysis.proposal import EXTRA_LAG_S, LARGEST_ACTIVITY, LARGEST_MARGIN, REQUIRED_MARGIN
+from app.core.analysis.margin import EXTRA_LAG_S, LARGEST_MARGIN, REQUIRED_MARGIN
+from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.definition import LogEvidence
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.copter_steps import CopterSteps, vector_of

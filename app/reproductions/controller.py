@@ -6,7 +6,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.paparazzi.loop_check import read_loop_trace
 from app.core.control.vertical_guidance import OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.figures.panels import Panel, Plot
 from app.reproductions.results import Progress, Result, Row, curve
@@ -22,6 +21,9 @@ _PANELS: Final = {
 
 def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -> Result:
     """Replay a recorded run and compare every output of every step. Raises InputError if the file is not a trace."""
+
+    from app.autopilots.paparazzi.loop_check import read_loop_trace  # noqa: PLC0415 - imports the readers of logs
+
     on_progress(0.0, "reading the recorded run")
     trace = read_loop_trace(trace_file)
     on_progress(0.3, f"replaying {len(trace)} steps")

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.registry import experiment_of
-from app.core.analysis.proposal import RINGING_DAMPING
+from app.core.analysis.margin import RINGING_DAMPING
 from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import TrajectoryError
 from app.core.policy import Gains, PolicySpace, Vector

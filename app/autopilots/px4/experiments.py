@@ -28,7 +28,8 @@ from app.autopilots.px4.replica.parameters import (
     step_parameters,
 )
 from app.core.analysis import recorded_flight
-from app.core.analysis.loop import GainSpace, LoggedFlight, LoopTexts, Run, found_hover, mean_over, transition_of
+from app.core.analysis.hover import found_hover
+from app.core.analysis.loop import GainSpace, LoggedFlight, LoopTexts, Run, mean_over, transition_of
 from app.core.analysis.segment import LEAD_S, Segment, Steps, interpolated
 from app.core.control.parameter_checks import PLAUSIBLE, require_within
 from app.core.experiments.base import Experiment, Scatter

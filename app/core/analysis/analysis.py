@@ -6,9 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from app.core.analysis.loop import AltitudeLoop, HoverAdvice, LoggedFlight, advise_hover
+from app.core.analysis.hover import HoverAdvice, advise_hover
+from app.core.analysis.loop import AltitudeLoop, LoggedFlight
+from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
-from app.core.analysis.proposal import REQUIRED_MARGIN, gain_margin, propose
+from app.core.analysis.proposal import propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.copter import FLOWN

@@ -13,8 +13,9 @@ from typing import ClassVar, Final, Self, TypeVar
 
 import numpy as np
 
-from app.core.analysis.loop import AltitudeLoop, HoverAdvice, LinearLoop, LoggedFlight, Run, advise_hover, found_hover
-from app.core.analysis.proposal import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
+from app.core.analysis.hover import HoverAdvice, advise_hover, found_hover
+from app.core.analysis.loop import AltitudeLoop, LinearLoop, LoggedFlight, Run
+from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.analysis.recorded_flight import Steps
 from app.core.definition import OptionValue
 from app.core.errors import InputError, Problem

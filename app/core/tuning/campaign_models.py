@@ -25,7 +25,8 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Box, Vector
 from app.core.tuning.calibration import Calibration, calibrate
-from app.core.tuning.copter_model import CopterModel, LimitedModel
+from app.core.tuning.copter_model import CopterModel
+from app.core.tuning.limited_model import LimitedModel
 from app.core.tuning.predictions import MODELS as PLAUSIBLE
 from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
 
@@ -48,7 +49,8 @@ _E = TypeVar("_E", bound=VerticalLoop)
 
 
 class VerticalModel(Generic[_E]):
-    """The part of a `CampaignModel` that both experiments share: the calibration, and what it predicts.
+    """The part of a `CampaignModel` that Paparazzi's takeoffs and altitude steps share: the calibration, and what it
+    predicts.
 
     `numbers` are the flights that were fitted; `base` is the best of them, by whose deviation from the model every
     prediction is corrected.

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.core.analysis.analysis import Analysis, analyze
-from app.core.analysis.loop import LoggedFlight, advise_hover
+from app.core.analysis.hover import advise_hover
+from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.errors import TrajectoryError
 from app.core.records.trajectory import Samples

@@ -4,7 +4,8 @@ import pytest
 
 from app.autopilots.ardupilot.experiments import ardupilot_loop
 from app.autopilots.px4.experiments import px4_loop
-from app.core.analysis.loop import AltitudeLoop, advise_hover, found_hover
+from app.core.analysis.hover import advise_hover, found_hover
+from app.core.analysis.loop import AltitudeLoop
 from app.core.errors import InputError
 
 

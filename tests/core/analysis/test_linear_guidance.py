@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.core.analysis.proposal import RINGING_DAMPING, damping_within_margin, gain_margin, least_damping
+from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, gain_margin, least_damping
 from app.core.experiments.altitude_steps import LinearGuidance
 from bench.copters.paparazzi_simulation import SteppedVehicle
 from bench.copters.paparazzi_simulation import least_damping as least_damping_in_steps

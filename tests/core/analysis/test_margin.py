@@ -8,7 +8,7 @@ import pytest
 from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.replica import vertical as loop
 from app.autopilots.ardupilot.replica.parameters import Parameters
-from app.core.analysis.proposal import (
+from app.core.analysis.margin import (
     EXTRA_LAG_S,
     LARGEST_MARGIN,
     REQUIRED_MARGIN,

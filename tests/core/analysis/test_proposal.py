@@ -5,15 +5,9 @@ from dataclasses import replace
 import pytest
 
 from app.autopilots.ardupilot.experiments import ArduPilotLoop
+from app.core.analysis.margin import REQUIRED_MARGIN, RINGING_DAMPING, gain_margin, least_damping
 from app.core.analysis.prediction import FlightModel
-from app.core.analysis.proposal import (
-    LARGEST_ACTIVITY,
-    REQUIRED_MARGIN,
-    RINGING_DAMPING,
-    gain_margin,
-    least_damping,
-    propose,
-)
+from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
 from app.core.analysis.vehicle_fit import fit_copter
 from bench.copters.simulation import SimulatedCopter
 from tests.core.analysis.flights import GUSTY, QUIET, recorded_steps, simulated_flight

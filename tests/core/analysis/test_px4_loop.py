@@ -9,8 +9,8 @@ from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.replica.parameters import STEP_S, Parameters
 from app.core.analysis.analysis import analyze
 from app.core.analysis.loop import GainSpace
+from app.core.analysis.margin import RINGING_DAMPING, gain_margin, least_damping
 from app.core.analysis.prediction import FlightModel
-from app.core.analysis.proposal import RINGING_DAMPING, gain_margin, least_damping
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.core.models.copter import FLOWN, Copter
