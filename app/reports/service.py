@@ -292,7 +292,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     if frozen is not None and frozen != vehicle.safe_gains:
         safe_gains = f"{format_gains(frozen)} at the first flight, now {safe_gains}"
     past = figure_data.history_of(session, campaign_id, curves=True)
-    landscape, _ = landscape_card(session, campaign_id, "light", stacked=True)
+    landscape = landscape_card(session, campaign_id, "light", stacked=True).card
     return Report(
         campaign=campaign,
         statistics=statistics,
