@@ -21,7 +21,7 @@ from app.campaigns import landscapes, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
-from app.campaigns.trials import photos, records
+from app.campaigns.trials import photos, records, reviews
 from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
 from app.common.errors import StorageError
@@ -141,7 +141,7 @@ class States:
         def say(session: Session) -> None:
             trial = trials.get_trial(session, trial_id)
             said = Classification.model_validate({"version": trial.version, "outcome": outcome, "reason": reason})
-            records.classify_trial(session, trial_id, said)
+            reviews.classify_trial(session, trial_id, said)
             _propose(session, trial.campaign_id)
 
         self._write(say)
