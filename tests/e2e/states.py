@@ -37,7 +37,6 @@ from app.flights import flight_rows
 from app.flights import service as flights
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
-from app.reproductions.controller import RECORDED_TAKEOFF
 from app.reproductions.registry import get_reproduction
 from app.vehicles.base import FlightOptions
 from app.vehicles.flight_end import StopRequest
@@ -185,7 +184,7 @@ class States:
     def check_of_the_example(self) -> int:
         """A controller check."""
         result = controller_checks.examine_example()
-        return self._write(lambda session: controller_checks.store_check(session, RECORDED_TAKEOFF.name, result).id)
+        return self._write(lambda session: controller_checks.store_example(session, result).id)
 
     def reproduce(self, name: str) -> None:
         """A reproduction that was run."""
