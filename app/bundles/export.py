@@ -109,8 +109,8 @@ class Packer:
                 Trial.view_of(
                     trial,
                     proposal=None if trial.proposal_id is None else places.get(trial.proposal_id),
-                    record=self._record(trial.trajectory, refused_for((trial,), "The bundle was not created")),
-                    predicted=self._record(trial.predicted, _spoilt(f"flight {trial.number}", row.id)),
+                    record=self._flown(trial),
+                    predicted=self._predicted(trial.predicted, f"flight {trial.number}", row.id),
                     photos=[self._photo(trial, photo) for photo in photos.get(trial.id, [])],
                     telemetry=self._telemetry(trial, flights.get(trial.id)),
                 )
@@ -118,18 +118,28 @@ class Packer:
             ],
             proposals=[
                 Proposal.view_of(
-                    proposal, predicted=self._record(proposal.predicted, _spoilt(f"proposal {proposal.id}", row.id))
+                    proposal, predicted=self._predicted(proposal.predicted, f"proposal {proposal.id}", row.id)
                 )
                 for proposal in proposals
             ],
         )
 
-    def _record(self, row: TrajectoryRow | None, damaged: StorageError) -> Record | None:
-        """Write the record, if there is one. Raises `damaged` when it is that."""
+    def _predicted(self, row: TrajectoryRow | None, whose: str, campaign_id: int) -> Record | None:
+        if row is not None and not is_intact(row):
+            raise StorageError(
+                f"The bundle was not created: the predicted curve of {whose} of campaign {campaign_id} is damaged.",
+                hint="Restore the database from an earlier backup.",
+            )
+        return self._record(row)
+
+    def _flown(self, row: TrialRow) -> Record | None:
+        if row.trajectory is not None and not is_intact(row.trajectory):
+            raise refused_for((row,), "The bundle was not created")
+        return self._record(row.trajectory)
+
+    def _record(self, row: TrajectoryRow | None) -> Record | None:
         if row is None:
             return None
-        if not is_intact(row):
-            raise damaged
         part = self._write(f"records/{row.id}.zst", row.data)
         self._session.expire(row, ["data"])
         return Record.view_of(row, part=part, codec=1)
@@ -161,13 +171,6 @@ def _vehicle(row: VehicleRow) -> Vehicle:
         return described
     kind, name = origin
     return described.model_copy(update={"kind": kind, "name": name, "registered": True})
-
-
-def _spoilt(whose: str, campaign_id: int) -> StorageError:
-    return StorageError(
-        f"The bundle was not created: the predicted curve of {whose} of campaign {campaign_id} is damaged.",
-        hint="Restore the database from an earlier backup.",
-    )
 
 
 def _digest(data: bytes) -> str:

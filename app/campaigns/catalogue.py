@@ -1,6 +1,7 @@
 """What this installation offers (experiments, strategies, vehicles, presets), and its health."""
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 from fastapi import APIRouter
@@ -165,14 +166,14 @@ def get_catalogue() -> Catalogue:
             AutopilotInfo.view_of(each, experiments=[own.name for own in each.experiments])
             for each in AUTOPILOTS.values()
         ],
-        presets=[
-            PresetInfo(
-                name=name,
-                title=file.name,
-                line=file.description,
-                campaign=NewCampaign.model_validate(file.model_dump(exclude={"description", "gains"})),
-            )
-            for name, file in ((name, read_preset(name)) for name in preset_names())
-            if not is_registered_one_by_one(get_kind(file.vehicle.kind))  # without being registered first
-        ],
+        presets=list(_presets()),
     )
+
+
+def _presets() -> Iterator[PresetInfo]:
+    """Those whose vehicle is available without being registered first."""
+    for name in preset_names():
+        file = read_preset(name)
+        if not is_registered_one_by_one(get_kind(file.vehicle.kind)):
+            campaign = NewCampaign.model_validate(file.model_dump(exclude={"description", "gains"}))
+            yield PresetInfo(name=name, title=file.name, line=file.description, campaign=campaign)

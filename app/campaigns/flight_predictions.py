@@ -4,7 +4,6 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from threading import Lock
 from typing import Final
 
@@ -16,10 +15,10 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.proposals import read_donor
 from app.campaigns.schemas import GainsPrediction, PredictedCurve
 from app.common.states import TrialState
-from app.core.definition import Definition
+from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
-from app.core.records.trajectory import Samples, Trajectory, select_samples
+from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.predictions import is_informative
 from app.core.tuning.proposals import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.strategy import Proposal, band_channels
@@ -69,8 +68,8 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     NotFoundError, and GainsError when they are not the campaign's gains or no controller can hold them.
     """
     with database.read() as session:
-        question, predict = _read(session, cache, campaign_id, asked)
-    return _view(question, predict())
+        read = _read(session, cache, campaign_id, asked)
+    return _view(read.question, _predict(cache, read))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +84,9 @@ class DatedPrediction:
 
 def predict_ahead(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> DatedPrediction:
     """The same before a transaction that plans a trial with these gains. Raises as `predict_gains` does."""
-    question, predict = _read(session, cache, campaign_id, asked)
-    return DatedPrediction(question.digest, question.gains, _stored(question, predict()))
+    read = _read(session, cache, campaign_id, asked)
+    question = read.question
+    return DatedPrediction(question.digest, question.gains, _stored(question, _predict(cache, read)))
 
 
 def predict_planned(
@@ -125,31 +125,44 @@ def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Questio
     return _Question(definition, trials, gains, digest, flown)
 
 
-def _read(
-    session: Session, cache: PredictorCache, campaign_id: int, asked: Gains
-) -> tuple[_Question, Callable[[], Proposal | None]]:
-    """Read all that a prediction needs of the database, and return what predicts without it."""
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """All that a prediction needs of the database; `kept` is the model if it is fitted already."""
+
+    question: _Question
+    flights: Sequence[Flight]
+    donor: Flight | None
+    kept: FittedModel | None
+
+
+def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> _Read:
     question = _question(session, repository.get_campaign(session, campaign_id), asked)
     kept = cache.find(question.digest)
     is_new = not question.flown and kept is None
     modelled = modelled_flights(question.experiment, history.flown_gains(question.trials)) if is_new else set()
     recorded = question.flown | modelled
-    flights = history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else ()
-    donor = read_donor(session, question.definition) if is_new else None
+    return _Read(
+        question,
+        flights=history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else (),
+        donor=read_donor(session, question.definition) if is_new else None,
+        kept=kept,
+    )
 
-    def fit() -> FlightPredictor | None:
-        if kept is not None:
-            return kept.predictor
-        return flight_predictor(question.definition, question.experiment, flights, donor)
 
-    def predict() -> Proposal | None:
-        predicted = predict_repeat(question.experiment, flights, question.gains)
-        if predicted is None:
-            fitted = cache.get(question.digest, fit)
-            predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
-        return _checked(question, predicted)
-
-    return question, predict
+def _predict(cache: PredictorCache, read: _Read) -> Proposal | None:
+    question, kept = read.question, read.kept
+    predicted = predict_repeat(question.experiment, read.flights, question.gains)
+    if predicted is None:
+        fitted = cache.get(
+            question.digest,
+            lambda: (
+                flight_predictor(question.definition, question.experiment, read.flights, read.donor)
+                if kept is None
+                else kept.predictor
+            ),
+        )
+        predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
+    return _checked(question, predicted)
 
 
 def _checked(question: _Question, predicted: Proposal | None) -> Proposal | None:
@@ -175,12 +188,12 @@ def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
 
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
     curve = None if predicted is None else predicted.predicted
-    lower, upper = (_drawn(curve, channel, thin_by_bends) for channel in band_channels(question.experiment.output))
+    lower, upper = (_edge(curve, channel) for channel in band_channels(question.experiment.output))
     return GainsPrediction(
         gains=dict(question.gains),
         predicted_error=None if predicted is None else predicted.predicted_error,
         interval=None if predicted is None else predicted.interval,
-        curve=_drawn(curve, question.experiment.output, partial(thinned, points=CURVE_POINTS)),
+        curve=_curve(curve, question.experiment.output),
         lower=lower,
         upper=upper,
     )
@@ -191,10 +204,15 @@ def _only(trajectory: Trajectory, *names: str) -> Trajectory:
     return replace(trajectory, channels={name: trajectory[name] for name in names if name in trajectory.channels})
 
 
-def _drawn(
-    trajectory: Trajectory | None, channel: str, thin: Callable[[Samples, Samples], tuple[list[float], list[float]]]
-) -> PredictedCurve | None:
+def _curve(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
+    if trajectory is None:
+        return None
+    time_s, values = thinned(trajectory.time_s, trajectory[channel], CURVE_POINTS)
+    return PredictedCurve(time_s=time_s, values=values)
+
+
+def _edge(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
     if trajectory is None or channel not in trajectory.channels:
         return None
-    time_s, values = thin(trajectory.time_s, trajectory[channel])
+    time_s, values = thin_by_bends(trajectory.time_s, trajectory[channel])
     return PredictedCurve(time_s=time_s, values=values)

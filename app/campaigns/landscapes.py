@@ -4,7 +4,7 @@ For a worker: `read_plan`, then `app.core.tuning.landscape` (pure, in any proces
 Only the newest landscape of a campaign is kept.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from app.autopilots.registry import experiment_of, space_of
 from app.campaigns import history, repository
+from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
 from app.campaigns.figure_data import history_of
 from app.campaigns.proposals import is_stale, read_history
@@ -31,9 +32,16 @@ LANDSCAPE_JOB: Final = "landscape"
 _STORED: Final = TypeAdapter(Landscape)
 
 
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> tuple[Card, bool]:
-    """The landscape of the latest proposal, or why there is none; and whether a job still has to be requested for it.
-    Raises NotFoundError for an unknown campaign."""
+@dataclass(frozen=True, slots=True)
+class LandscapeAnswer:
+    """The card, and whether a job still has to be requested for its content."""
+
+    card: Card
+    wanted: bool = False
+
+
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> LandscapeAnswer:
+    """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     definition = definition_of(campaign)
@@ -47,7 +55,7 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stac
     if found is None:
         return _not_yet(session, campaign, proposal)
     drawn = history_of(session, campaign_id, curves=False)
-    return card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)), False
+    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
@@ -74,13 +82,11 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
             "The campaign's flights have changed since these gains were proposed.",
             hint="No action is needed: the landscape of the next proposal replaces it.",
         )
-    # The centre is the flight that the proposal starts from, else the proposal itself.
-    base = next((each for each in past.flights if each.number == proposal.explanation.get("base_flight")), proposal)
     return LandscapePlan(
         definition=past.definition,
         flights=past.flights,
         donor=past.donor,
-        centre=dict(base.gains),
+        centre=_grid_centre(past, proposal),
         marks=(*(flight.gains for flight in past.flights), proposal.gains),
     )
 
@@ -95,7 +101,7 @@ def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
     return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
 
 
-def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> tuple[Card, bool]:
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> LandscapeAnswer:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed. Their landscape follows.")
     job = _job(session, campaign.id, proposal.id)
@@ -113,9 +119,9 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     return _waiting(reason, wanted=wanted)
 
 
-def _waiting(reason: str, *, wanted: bool = False) -> tuple[Card, bool]:
+def _waiting(reason: str, *, wanted: bool = False) -> LandscapeAnswer:
     title = "Error landscape of the model"
-    return Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted
+    return LandscapeAnswer(Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted)
 
 
 def _name(campaign_id: int) -> str:
@@ -138,6 +144,13 @@ def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape |
     if job is None or job.result is None or job.result["proposal_id"] != proposal_id:
         return None
     return _STORED.validate_python(job.result["landscape"])
+
+
+def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, float]:
+    """Gains of the flight that the proposal starts from, else the proposal's own."""
+    number = proposal.explanation.get("base_flight")
+    base = next((flight for flight in past.flights if flight.number == number), None)
+    return dict(proposal.gains if base is None else base.gains)
 
 
 def _search(proposal: ProposalRow) -> Search:

@@ -265,14 +265,14 @@ def safe_gains_changed(session: Session, vehicle_id: int) -> None:
         request_proposal(session, row)
 
 
-_KINDS: Final[Mapping[str, ChoiceKind]] = {
+_CHOICE_KINDS: Final[Mapping[str, ChoiceKind]] = {
     "start": "baseline",
     "step": "step",
     "shorter step": "step",
     "repeat": "repeat",
     "baseline": "baseline",
 }
-_ORDER: Final[tuple[ChoiceKind, ...]] = ("step", "smaller step", "repeat", "baseline")
+_CHOICE_ORDER: Final[tuple[ChoiceKind, ...]] = ("step", "smaller step", "repeat", "baseline")
 
 
 def variant_gains(session: Session, campaign: CampaignRow, variant: Variant) -> dict[str, float]:
@@ -306,7 +306,7 @@ def choices_of(
     flown: tuple[Variant, ...] = ("repeat", "baseline")
     # Proposals of kind `none` and `manual` were flown, unless the bounds have moved them.
     again = next((kind for kind in flown if variants.get(kind) == proposal.gains), None)
-    own: ChoiceKind = _KINDS.get(proposal.kind, again or "step")
+    own: ChoiceKind = _CHOICE_KINDS.get(proposal.kind, again or "step")
     others: dict[ChoiceKind, dict[str, float]] = {
         kind: gains
         for kind, gains in variants.items()
@@ -315,7 +315,7 @@ def choices_of(
     if others.get("baseline") == variants.get("repeat"):
         others.pop("baseline", None)
     found = {own: dict(proposal.gains), **others}
-    return {kind: found[kind] for kind in _ORDER if kind in found}
+    return {kind: found[kind] for kind in _CHOICE_ORDER if kind in found}
 
 
 def _variants(

@@ -173,11 +173,11 @@ def get_landscape(
     done the card is `waiting`.
     """
     with database.read() as session:
-        card, is_wanted = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
-    if is_wanted and is_allowed(Permission.CHANGE, asking.caller):
+        asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
+    if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
         with database.write() as session:
             landscapes.request_landscape(session, campaign_id)
-    return card
+    return asked.card
 
 
 @figures_router.get("/campaigns/{campaign_id}/figures/{name}")

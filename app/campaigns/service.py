@@ -167,15 +167,10 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     return campaign_view(session, add_campaign(session, name, definition, vehicle, parent_id=origin.id))
 
 
-def _get_permitted(
-    session: Session, campaign_id: int, context: RequestContext, action: str | None = None
-) -> CampaignRow:
-    """The campaign, to be changed. Raises NotAllowedError for one on a real vehicle when the client lacks the key, and
-    ConflictError when its state does not allow the action."""
+def _get_permitted(session: Session, campaign_id: int, context: RequestContext) -> CampaignRow:
+    """The campaign, to be changed. Raises NotAllowedError for one on a real vehicle when the client lacks the key."""
     row = repository.get_campaign(session, campaign_id)
     require_may(Permission.REVIEW, row.vehicle, context)
-    if action is not None:
-        check_action(CAMPAIGN_ACTIONS, action, row.state, f"Campaign {row.id}")
     return row
 
 
@@ -232,7 +227,8 @@ def delete_campaign(session: Session, campaign_id: int, version: int, context: R
 
 def finish_campaign(session: Session, campaign_id: int, reason: str, context: RequestContext) -> Campaign:
     """Finish a campaign on the operator's decision. Raises ConflictError unless it is between flights."""
-    row = _get_permitted(session, campaign_id, context, "finish")
+    row = _get_permitted(session, campaign_id, context)
+    check_action(CAMPAIGN_ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     end_campaign(session, row, Outcome.STOPPED, reason)
     return campaign_view(session, row)
@@ -241,7 +237,8 @@ def finish_campaign(session: Session, campaign_id: int, reason: str, context: Re
 def reopen_campaign(session: Session, campaign_id: int, flights: int, context: RequestContext) -> Campaign:
     """Reopen a finished campaign for this many more flights. Raises ConflictError unless it is finished, and for a
     rehearsal, because its result lets another campaign fly."""
-    row = _get_permitted(session, campaign_id, context, "reopen")
+    row = _get_permitted(session, campaign_id, context)
+    check_action(CAMPAIGN_ACTIONS, "reopen", row.state, f"Campaign {row.id}")
     if (rehearsed := repository.rehearsed_id(session, row.id)) is not None:
         raise ConflictError(
             f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, which depends on its result.",
@@ -255,7 +252,8 @@ def reopen_campaign(session: Session, campaign_id: int, flights: int, context: R
 
 def archive_campaign(session: Session, campaign_id: int, context: RequestContext) -> Campaign:
     """Archive a campaign. Raises ConflictError unless it is finished."""
-    row = _get_permitted(session, campaign_id, context, "archive")
+    row = _get_permitted(session, campaign_id, context)
+    check_action(CAMPAIGN_ACTIONS, "archive", row.state, f"Campaign {row.id}")
     set_campaign_state(row, CampaignState.ARCHIVED)
     return campaign_view(session, row)
 

@@ -23,17 +23,13 @@ _log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class _CampaignJob:
-    """Carries out jobs of campaigns for a job runner."""
+class ProposalJob:
+    """Carries out proposal jobs for a job runner."""
 
     database: Database
     pool: ComputePool
     _: KW_ONLY
     worker: str
-
-
-class ProposalJob(_CampaignJob):
-    """Carries out proposal jobs."""
 
     def __call__(self, job: ClaimedJob) -> None:
         """Compute a proposal from the stored flights and store it.
@@ -52,10 +48,14 @@ class ProposalJob(_CampaignJob):
         _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LandscapeJob(_CampaignJob):
-    """Carries out landscape jobs."""
+@dataclass(frozen=True, slots=True)
+class LandscapeJob:
+    """Carries out landscape jobs for a job runner."""
 
+    database: Database
+    pool: ComputePool
+    _: KW_ONLY
+    worker: str
     lease_s: float
 
     def __call__(self, job: ClaimedJob) -> None:

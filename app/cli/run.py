@@ -16,7 +16,7 @@ from app.campaigns import service as campaigns
 from app.campaigns.campaign_files import CampaignFile, gains_by_hand
 from app.campaigns.computation import compute
 from app.campaigns.definitions import check_campaign, stored
-from app.campaigns.trials.records import classify_trial
+from app.campaigns.trials.reviews import classify_trial
 from app.campaigns.trials.schemas import Classification, FlightOrder, TrialPlan
 from app.campaigns.trials.service import create_trial
 from app.campaigns.trials.views import reason_of

@@ -4,7 +4,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeGuard
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -254,5 +254,10 @@ def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> lis
 
 
 def _change(first: OptionValue | None, value: OptionValue | None) -> int | float | None:
-    numbers = [one for one in (value, first) if isinstance(one, int | float) and not isinstance(one, bool)]
-    return numbers[0] - numbers[1] if len(numbers) == 2 else None
+    if _is_number(first) and _is_number(value):
+        return value - first
+    return None
+
+
+def _is_number(value: OptionValue | None) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)

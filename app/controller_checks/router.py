@@ -9,7 +9,6 @@ from app.common.schemas import Page
 from app.controller_checks import service
 from app.controller_checks.service import ControllerCheck, ControllerCheckSummary
 from app.figures.base import Card
-from app.reproductions.controller import RECORDED_TAKEOFF
 from app.web.dependencies import (
     REQUEST_BODY,
     CursorText,
@@ -56,7 +55,7 @@ def check_controller(
 def check_example_controller(act: IdempotentPost) -> ControllerCheck:
     """Check the example recording: a takeoff that comes with Gainline, recorded from the autopilot's own code."""
     result = service.examine_example()
-    return act(lambda session: service.store_check(session, RECORDED_TAKEOFF.name, result))
+    return act(lambda session: service.store_example(session, result))
 
 
 @router.get("/{check_id}")

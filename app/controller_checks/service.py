@@ -84,6 +84,10 @@ def examine_example() -> Result:
     return examine_file(RECORDED_TAKEOFF)
 
 
+def store_example(session: Session, result: Result) -> ControllerCheck:
+    return store_check(session, RECORDED_TAKEOFF.name, result)
+
+
 def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
     """Store the result of a check; the recording itself is not kept."""
     row = ControllerCheckRow(

@@ -176,7 +176,7 @@ class History(Scored):
 
     @property
     def next_flights(self) -> tuple[NextFlight, ...]:
-        """The proposed flight, if there is one."""
+        """The proposed flight, if there is one, to be joined to the flown ones."""
         return () if self.proposal is None else (self.proposal,)
 
     @property

@@ -336,7 +336,7 @@ class ErrorsFigure:
         return f"Best error {formatting.short(lowest)} {self.history.error_unit} in flight {best.number}{share}."
 
     def _table(self) -> Table:
-        unit, noise = self.history.error_unit, self.history.noise
+        unit, noise, proposal = self.history.error_unit, self.history.noise, self.history.proposal
         best_so_far = accumulate(self.history.valid_errors, min)
         running = dict(zip((flight.number for flight in self.history.valid), best_so_far, strict=True))
         rows: list[tuple[Cell, ...]] = [
@@ -351,11 +351,10 @@ class ErrorsFigure:
             )
             for flight in self.history.flights
         ]
-        rows += [
-            (flight.number, "proposed", None, None, flight.predicted_error, *_ends(flight.interval), None)
-            for flight in self.history.next_flights
-            if flight.predicted_error is not None
-        ]
+        if proposal is not None and proposal.predicted_error is not None:
+            rows.append(
+                (proposal.number, "proposed", None, None, proposal.predicted_error, *_ends(proposal.interval), None)
+            )
         return Table(
             (
                 Column("flight", "Flight", digits=0),

@@ -178,18 +178,17 @@ class FlightFigure:
     def _context(self, palette: theme.Palette) -> list[Trace]:
         """What the flight is compared with, as far as it is known."""
         record, unit = self.record, self.record.output_unit
-        goal = None if record.reference is None else scored_part(record.reference, record.set_point)
-        curves = (
-            ("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot"),
-            ("Reference", goal, palette.dim, 1.5, "reference", None, "dashdot"),
-            (f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit, "solid"),
-            (record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash"),
-        )
-        return [
-            _line(name, curve, colour, width, role, shown, dash)
-            for name, curve, colour, width, role, shown, dash in curves
-            if curve is not None
-        ]
+        drawn = [_line("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot")]
+        if record.reference is not None:
+            scored = scored_part(record.reference, record.set_point)
+            drawn.append(_line("Reference", scored, palette.dim, 1.5, "reference", None, "dashdot"))
+        if record.best is not None:
+            drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
+        if record.predicted is not None:
+            drawn.append(
+                _line(record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash")
+            )
+        return drawn
 
     def _summary(self) -> str:
         record = self.record

@@ -29,7 +29,7 @@ class GainsFigure:
     title: ClassVar[str] = "Gains per flight"
 
     def not_ready(self) -> str | None:
-        if self.history.flights or self.history.next_flights:
+        if self.history.flights or self.history.proposal is not None:
             return None
         return "The gains of each flight appear here once the first ones are proposed."
 
@@ -52,7 +52,7 @@ class GainsFigure:
 
     def _panel(self, palette: theme.Palette, index: int, gain: Gain) -> list[Trace]:
         colour = palette.gains[(index - 1) % len(palette.gains)]
-        flights, best = self.history.flights, self.history.best
+        flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
         axes: dict[str, Any] = {**theme.on(index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
         crowded = len(flights) > MANY
@@ -81,20 +81,19 @@ class GainsFigure:
                 "marker": theme.solid(colour, size=13, symbol="star"),
             }
             drawn.append({**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}})
-        drawn += [
-            scatter(
-                f"{gain.title}, next",
-                ([following.number], [following.gains[gain.name]]),
-                role="next",
-                about={"gain": gain.name},
-                mode="markers",
-                marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-                hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
-                **axes,
-            )
-            for following in self.history.next_flights
-        ]
-        return drawn
+        if proposal is None:
+            return drawn
+        following = scatter(
+            f"{gain.title}, next",
+            ([proposal.number], [proposal.gains[gain.name]]),
+            role="next",
+            about={"gain": gain.name},
+            mode="markers",
+            marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+            hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+            **axes,
+        )
+        return [*drawn, following]
 
     def _axes(self, palette: theme.Palette, index: int, gain: Gain) -> dict[str, object]:
         count = len(self.history.gains)
@@ -135,7 +134,8 @@ class GainsFigure:
 
     def _table(self) -> Table:
         flown = [(str(flight.number), flight.gains) for flight in self.history.flights]
-        flown += [("proposed", flight.gains) for flight in self.history.next_flights]
+        if self.history.proposal is not None:
+            flown.append(("proposed", self.history.proposal.gains))
         columns = (
             Column("flight", "Flight"),
             *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in self.history.gains),

@@ -172,17 +172,20 @@ class LandscapeFigure:
             )
 
     def _proposed(self, palette: theme.Palette, draw: Callable[..., Trace]) -> Iterator[Trace]:
-        unit = self.history.error_unit
-        for proposal in self.history.next_flights:
-            error = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
-            yield draw(
-                [proposal.gains],
-                "proposed",
-                f"Next, flight {proposal.number}",
-                "markers",
-                marker=_edged(palette, palette.prediction, size=13, symbol="diamond"),
-                hovertext=[f"Flight {proposal.number}, proposed{error} {unit if error else ''}"],
-            )
+        proposal = self.history.proposal
+        if proposal is None:
+            return
+        prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
+        yield draw(
+            [proposal.gains],
+            "proposed",
+            f"Next, flight {proposal.number}",
+            "markers",
+            marker=_edged(palette, palette.prediction, size=13, symbol="diamond"),
+            hovertext=[
+                f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
+            ],
+        )
 
     def _axes(self, palette: theme.Palette, index: int, one: Slice) -> dict[str, object]:
         across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
@@ -236,10 +239,11 @@ class LandscapeFigure:
             for flight in history.flights
         ]
         rows += [self._row("Tried on the model", step.gains, step.predicted_error, None) for step in self.search.tried]
-        rows += [
-            self._row(f"Flight {flight.number}, proposed", flight.gains, flight.predicted_error, None)
-            for flight in history.next_flights
-        ]
+        if history.proposal is not None:
+            next_one = history.proposal
+            rows.append(
+                self._row(f"Flight {next_one.number}, proposed", next_one.gains, next_one.predicted_error, None)
+            )
         for one in self.landscape.slices:
             gains, error = lowest(one, self.landscape.centre)
             rows.append(self._row(f"Lowest of {one.y} over {one.x}", gains, error, None))

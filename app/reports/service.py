@@ -180,13 +180,15 @@ def _start(start: Start) -> str:
 
 def _stop(stop: StopRule, open_until_flight: int) -> str:
     most = f"at most {describe_budget(stop.max_flights, open_until_flight)}, invalid ones not counted"
-    rules = {
-        "paper": f"two consecutive flights less than {short_percent(stop.improvement)} better than the best; {most}",
-        "noise": f"no resolvable improvement at {short_percent(stop.confidence)} confidence; {most}",
-        "budget": most,
-    }
-    battery = "" if stop.min_battery_v is None else f"; or a flight that ends below {stop.min_battery_v:g} V"
-    return f"{rules[stop.kind]}{battery}"
+    match stop.kind:
+        case "paper":
+            rule = f"two consecutive flights less than {short_percent(stop.improvement)} better than the best; {most}"
+        case "noise":
+            sure = short_percent(stop.confidence)
+            rule = f"no resolvable improvement at {sure} confidence; {most}"
+        case _:
+            rule = most
+    return rule if stop.min_battery_v is None else f"{rule}; or a flight that ends below {stop.min_battery_v:g} V"
 
 
 _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
@@ -198,7 +200,7 @@ _CAUSES: Final[Mapping[AbortCause, str]] = {
 }
 
 
-def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
+def flight_anomalies(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
         if (kind := _ENDINGS.get(trial.state)) is not None:
@@ -223,7 +225,7 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             yield Anomaly(trial.number, kind or "Vehicle problem", end)
 
 
-DAMAGED: Final = (
+_DAMAGED_RECORD: Final = (
     "The stored record does not match its checksum. The curve shown is the coarse copy made at landing, and the error "
     "is the one computed then. Restore the record from an earlier backup."
 )
@@ -234,7 +236,7 @@ def _end_beside(state: str, end: FlightEnd | None) -> str:
     return "" if end is None else cause_text(end, "" if state == "aborted" else "aborted")
 
 
-def of_vehicle(
+def vehicle_anomalies(
     campaign: Campaign,
     vehicle: Vehicle,
     acts: Iterable[VehicleAct],
@@ -256,7 +258,7 @@ def of_vehicle(
             yield Anomaly(None, "Quarantine", f"Released{by} during the campaign: {act.reason}")
 
 
-MAX_BYTES: Final = 24 * 2**20
+MAX_PHOTO_BYTES: Final = 24 * 2**20
 """Limit for all photos together, in original size; they take a third more in the file."""
 
 
@@ -265,7 +267,7 @@ def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> I
     photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
     for row, size in photos_of_campaign(session, campaign_id):
         photos.setdefault(row.trial_id, []).append((row, size))
-    kept, room = set[int](), MAX_BYTES
+    kept, room = set[int](), MAX_PHOTO_BYTES
     turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
     for _, photo_id, size in turns:  # the first photo of each trial comes before the second of any
         if size <= room:
@@ -292,7 +294,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     if frozen is not None and frozen != vehicle.safe_gains:
         safe_gains = f"{format_gains(frozen)} at the first flight, now {safe_gains}"
     past = figure_data.history_of(session, campaign_id, curves=True)
-    landscape, _ = landscape_card(session, campaign_id, "light", stacked=True)
+    landscape = landscape_card(session, campaign_id, "light", stacked=True).card
     return Report(
         campaign=campaign,
         statistics=statistics,
@@ -306,7 +308,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
             *((landscape,) if landscape.state == "ready" else ()),  # only if it has been computed already
         ),
         remarks=tuple(remarks_on(session, campaign_id, trials)),
-        photo_bytes=MAX_BYTES,
+        photo_bytes=MAX_PHOTO_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
         version=__version__,
         made_at=utc_now(),
@@ -314,12 +316,12 @@ def report_of(session: Session, campaign_id: int) -> Report:
 
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
-    yield from of_flights(trials, unit)
-    yield from (Anomaly(row.number, "Damaged record", DAMAGED) for row in damaged_trials(session, campaign.id))
+    yield from flight_anomalies(trials, unit)
+    yield from (Anomaly(row.number, "Damaged record", _DAMAGED_RECORD) for row in damaged_trials(session, campaign.id))
     if not campaign.vehicle.registered:
         return
     vehicle_id = campaign.vehicle.id
-    yield from of_vehicle(
+    yield from vehicle_anomalies(
         campaign,
         fleet.get_vehicle(session, vehicle_id),
         _all(lambda cursor: acts_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),

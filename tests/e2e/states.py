@@ -21,7 +21,7 @@ from app.campaigns import landscapes, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
-from app.campaigns.trials import photos, records
+from app.campaigns.trials import photos, records, reviews
 from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
 from app.common.errors import StorageError
@@ -37,7 +37,6 @@ from app.flights import flight_rows
 from app.flights import service as flights
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
-from app.reproductions.controller import RECORDED_TAKEOFF
 from app.reproductions.registry import get_reproduction
 from app.vehicles.base import FlightOptions
 from app.vehicles.flight_end import StopRequest
@@ -141,7 +140,7 @@ class States:
         def say(session: Session) -> None:
             trial = trials.get_trial(session, trial_id)
             said = Classification.model_validate({"version": trial.version, "outcome": outcome, "reason": reason})
-            records.classify_trial(session, trial_id, said)
+            reviews.classify_trial(session, trial_id, said)
             _propose(session, trial.campaign_id)
 
         self._write(say)
@@ -185,7 +184,7 @@ class States:
     def check_of_the_example(self) -> int:
         """A controller check."""
         result = controller_checks.examine_example()
-        return self._write(lambda session: controller_checks.store_check(session, RECORDED_TAKEOFF.name, result).id)
+        return self._write(lambda session: controller_checks.store_example(session, result).id)
 
     def reproduce(self, name: str) -> None:
         """A reproduction that was run."""

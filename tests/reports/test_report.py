@@ -163,7 +163,7 @@ def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_e
     first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     for trial in (first, first, first, third):
         add(client, trial, png())
-    monkeypatch.setattr(service, "MAX_BYTES", 3 * len(png()) - 1)
+    monkeypatch.setattr(service, "MAX_PHOTO_BYTES", 3 * len(png()) - 1)
     page = read(client, campaign)
     assert [found["alt"] for tag, found in page.tags if tag == "img"] == [
         "Photo 1 of flight 1",

@@ -7,7 +7,7 @@ from fastapi.responses import FileResponse
 
 from app.campaigns.flight_predictions import PredictorCache
 from app.campaigns.schemas import Campaign, ConsideredGains
-from app.campaigns.trials import photos, records, service, views
+from app.campaigns.trials import photos, records, reviews, service
 from app.campaigns.trials.schemas import (
     AbortJudgement,
     Classification,
@@ -92,20 +92,20 @@ def cancel_trial(act: IdempotentPost, trial_id: Id) -> Trial:
 @router.post("/trials/{trial_id}/classify")
 def classify_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: Classification) -> Trial:
     """Classify a finished flight as valid, aborted or invalid; whatever was computed from it is recomputed."""
-    return act(lambda session: records.classify_trial(session, trial_id, body, asking))
+    return act(lambda session: reviews.classify_trial(session, trial_id, body, asking))
 
 
 @router.post("/trials/{trial_id}/judge-abort")
 def judge_abort(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: AbortJudgement) -> Trial:
     """Record why the operator aborted a flight. It counts against its gains only if the vehicle behaved badly; whatever
     was computed from it is recomputed."""
-    return act(lambda session: records.judge_abort(session, trial_id, body, asking))
+    return act(lambda session: reviews.judge_abort(session, trial_id, body, asking))
 
 
 @router.get("/trials/{trial_id}/trajectory")
 def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(ge=10, le=20_000)] = 1000) -> Trajectory:
     """The record, thinned to at most `points` samples with peaks kept."""
-    return views.get_trajectory(session, trial_id, points)
+    return records.get_trajectory(session, trial_id, points)
 
 
 @router.get(
@@ -122,7 +122,7 @@ def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(g
 )
 def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
     """The full record as CSV, every number exactly as stored (single precision, nine digits)."""
-    name, csv, checksum = views.export_trajectory(session, trial_id)
+    name, csv, checksum = records.export_trajectory(session, trial_id)
     headers = {"Content-Disposition": f'attachment; filename="{name}"', "X-Checksum-SHA256": checksum}
     return Response(csv, media_type="text/csv", headers=headers)
 
@@ -131,7 +131,7 @@ def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
 def get_telemetry_log(session: Reader, settings: CurrentSettings, trial_id: Id) -> FileResponse:
     """The .tlog of the trial's last flight: all messages over the link in both directions, in the format of ground
     stations."""
-    file, name = views.find_telemetry_log(session, trial_id, settings.data_dir)
+    file, name = records.find_telemetry_log(session, trial_id, settings.data_dir)
     return FileResponse(file, media_type="application/octet-stream", filename=name)
 
 

@@ -65,7 +65,8 @@ def check_own_gains(
 
     Takes about 0.1 s. Raises GainsError that names what is refused and what would pass.
     """
-    return _judged(campaign, *gated_gains(session, campaign, asked), overrule)
+    gains, gate = gated_gains(session, campaign, asked)
+    return _judged(campaign, gains, gate, overrule)
 
 
 def evaluate_gate(session: Session, campaign_id: int, asked: Gains) -> Gate:

@@ -1,32 +1,28 @@
-"""API views of trials and their records, with the sentences that describe them and the comparison with the best before
-and the first, given the scatter of repeated flights.
+"""API views of trials, with the sentences that describe them and the comparison with the best before and the first,
+given the scatter of repeated flights.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import accumulate
-from pathlib import Path
 from typing import Final, Literal
 
-import numpy as np
 from sqlalchemy.orm import Session
 
 from app.autopilots.registry import get_experiment
-from app.campaigns import history, repository
+from app.campaigns import history
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.common.conflict_checks import allowed
-from app.common.data_folder import log_of_trial, telemetry_log
-from app.common.errors import NotFoundError
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
 from app.core.formatting import named_flights, percent, short
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
-from app.core.records.trajectory import CHANNEL_UNITS, select_samples
+from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
 from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
@@ -39,8 +35,8 @@ CONFIDENCE: Final = 0.9
 class ReferenceFlights:
     """The valid flights that a campaign's trials are compared with, indexed for constant or logarithmic lookup.
 
-    `valid` are the flights in their order, `prior` is the experiment's scatter. `numbers` are
-    theirs; `by_number` and `by_gains` hold all flights with the gains of one.
+    `valid` are the flights in their order, `prior` is the experiment's scatter. `numbers` are those of the flights that
+    have an error; `by_number` and `by_gains` hold all flights with the gains of one.
     """
 
     def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
@@ -63,19 +59,26 @@ def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]
 
     Each side counts with all flights of its gains.
     """
-    own, best = field.by_number.get(row.number), field.best_before(row.number)
-    if own is None or best is None or field.scatter is None:
+    own = field.by_number.get(row.number)
+    if own is None or field.scatter is None:
         return []
-    others: dict[int, Literal["best before", "first"]] = {best[1]: "best before"}
-    others.setdefault(field.numbers[0], "first")
     found = []
-    for number, against in others.items():
+    for against, number in _others(row, field):
         other = field.by_number.get(number)
         if other is None or other.gains == own.gains:
             continue
         comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
         found.append(TrialComparison.view_of(comparison, against=against, trial_number=number))
     return found
+
+
+def _others(row: TrialRow, field: ReferenceFlights) -> Iterator[tuple[Literal["best before", "first"], int]]:
+    best = field.best_before(row.number)
+    if best is None:
+        return
+    yield "best before", best[1]
+    if (first := field.numbers[0]) != best[1]:
+        yield "first", first
 
 
 def _key(gains: Gains) -> object:
@@ -96,11 +99,8 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     return [_view(row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
-def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
-    """A trial's record, thinned to at most `points` samples such that the scored output keeps its peaks. Raises
-    NotFoundError when there is none, StorageError when it is damaged."""
-    row = history.trial_row(session, trial_id)
-    trajectory = history.record_of(session, row)
+def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
+    """View of a record, thinned to at most `points` samples such that the scored output keeps its peaks."""
     assert row.trajectory is not None
     output = get_experiment(row.campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
@@ -117,32 +117,6 @@ def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOu
     )
 
 
-def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:
-    """File name, CSV and checksum of a full record: every sample with nine digits, which restore the stored
-    single-precision number exactly."""
-    row = history.trial_row(session, trial_id)
-    record = history.record_of(session, row)
-    assert row.trajectory is not None
-    table = np.column_stack([record.time_s, *record.channels.values()])
-    lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
-    name = f"campaign-{row.campaign_id}-trial-{row.number}.csv"
-    return name, "\n".join(lines) + "\n", row.trajectory.checksum
-
-
-def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
-    """Telemetry log of the trial's last flight that has one, else the one imported with the trial; and its name for
-    download.
-
-    Raises NotFoundError when there is none.
-    """
-    row = history.trial_row(session, trial_id)
-    flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
-    for file in (*flown, log_of_trial(data_dir, trial_id)):
-        if file.is_file():
-            return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"
-    raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")
-
-
 def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
     predicted_error, interval = _prediction(row, field)
     same = field.by_gains.get(_key(row.gains))
@@ -151,9 +125,7 @@ def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehe
         row,
         predicted_error=predicted_error,
         predicted_interval=interval,
-        inside_interval=None
-        if interval is None or row.error is None
-        else interval.lower <= row.error <= interval.upper,
+        inside_interval=_is_inside(interval, row),
         group=None
         if same is None or field.scatter is None
         else GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size),
@@ -162,14 +134,7 @@ def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehe
         glitches=row.glitches or [],
         record=_record(row),
         may_be_valid=_may_be_valid(row),
-        flight=None
-        if flight is None
-        else FlightBrief.view_of(
-            flight,
-            problem=end_text(flight.end),
-            standing_down=unstaged_text(Requester(flight.stand_down)) if flight.stand_down else "",
-            safe_gains_restored=None if flight.restored is None else flight.restored == flight.safe_gains,
-        ),
+        flight=_flight(flight),
         speed=flight.speed if flight else None,
         settings=row.settings or {},
         reason=reason_of(row),
@@ -182,6 +147,12 @@ def _prediction(row: TrialRow, field: ReferenceFlights) -> tuple[float | None, I
     """The predicted error and its interval; both None if they said nothing."""
     is_corrected = field.best_before(row.number) is not None
     return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
+
+
+def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
+    if interval is None or row.error is None:
+        return None
+    return interval.lower <= row.error <= interval.upper
 
 
 def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
@@ -253,6 +224,17 @@ def _may_be_valid(row: TrialRow) -> bool:
 
 def _units(channels: Iterable[str]) -> dict[str, str]:
     return {name: CHANNEL_UNITS.get(name, "") for name in channels}
+
+
+def _flight(row: FlightRow | None) -> FlightBrief | None:
+    if row is None:
+        return None
+    return FlightBrief.view_of(
+        row,
+        problem=end_text(row.end),
+        standing_down=unstaged_text(Requester(row.stand_down)) if row.stand_down else "",
+        safe_gains_restored=None if row.restored is None else row.restored == row.safe_gains,
+    )
 
 
 def _actions(row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
