@@ -8,10 +8,10 @@ import { count } from "../../ui/format";
 import { campaignStateLabel } from "../../ui/states";
 import { plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
+import { ArchiveCampaign } from "../campaign/EndCampaign";
+import { CloneForm } from "../new-campaign/CloneForm";
 import classes from "./CampaignCard.module.css";
-import { CloneForm } from "./CloneForm";
 import { progress } from "./campaignList";
-import { ArchiveCampaign } from "./EndCampaign";
 
 /** A campaign in the list: result, curves, next action. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {

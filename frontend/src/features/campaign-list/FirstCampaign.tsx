@@ -5,9 +5,9 @@ import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
+import { firstPreset } from "../new-campaign/newCampaign";
 import classes from "./FirstCampaign.module.css";
 import { ImportBundle } from "./ImportBundle";
-import { firstPreset } from "./newCampaign";
 
 const STEPS = [
   [

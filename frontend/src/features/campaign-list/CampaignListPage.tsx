@@ -11,7 +11,7 @@ import work from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
-import classes from "./CampaignsPage.module.css";
+import classes from "./CampaignListPage.module.css";
 import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
 import { ImportBundle } from "./ImportBundle";
@@ -24,7 +24,7 @@ const SORTS: { value: Sort; label: string }[] = [
   { value: "error", label: "Lowest error" },
 ];
 
-export function CampaignsPage() {
+export function CampaignListPage() {
   useTitle("Campaigns");
   const [search, setSearch] = useState("");
   const [state, setState] = useState<StateFilter>("all");
