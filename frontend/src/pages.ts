@@ -1,6 +1,6 @@
 /** All pages but the first, in one bundle that is loaded while the first page is idle. */
 
-export { FlightPage } from "./features/campaign/FlightPage";
+export { FlightPage } from "./features/campaign/flights/FlightPage";
 export { ControllerPage } from "./features/checks/ControllerPage";
 export { LogAnalysisPage } from "./features/checks/LogAnalysisPage";
 export { ComparePage } from "./features/compare/ComparePage";
