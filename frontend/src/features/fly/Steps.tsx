@@ -18,7 +18,7 @@ import { trialStateLabel } from "../../ui/states";
 import { FlightMarkers, PredictionResult } from "../campaign/flights/FlightMarkers";
 import { FlightNotes } from "../campaign/flights/FlightNotes";
 import { AbortCause, FlightReview } from "../campaign/flights/FlightReview";
-import { FlightProblem } from "../campaign/next-flight/FlightProblem";
+import { FlightProblem } from "../campaign/next-flight/BeforeFlight";
 import { speedOf, wantsRehearsal } from "../campaign/next-flight/nextStep";
 import { SpeedSwitch, useSpeed } from "../campaign/next-flight/SpeedSwitch";
 import { isToldByVehicle, leftGainsText, sentenceOf } from "../campaign/verdict/verdict";

@@ -5,7 +5,6 @@ import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../../api/
 import type { Trial } from "../../../api/types";
 import { ErrorNotice } from "../../../ui/Notices";
 import classes from "../verdict/VerdictPanel.module.css";
-import { draftOf, forgetDraft, keepDraft } from "./noteDraft";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
 const LONGEST_NOTE = 2000;
@@ -133,4 +132,22 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
 function withPin(note: string, timeS: number): string {
   const before = note.trimEnd();
   return `${before}${before && "\n"}${timeS.toFixed(1)} s: `;
+}
+
+/** Unsaved notes, by flight: kept in this tab while other pages are open. */
+const keyOf = (trialId: number): string => `note ${trialId}`;
+
+/** The unsaved text of a flight's note, else the saved one. */
+function draftOf(trialId: number, saved: string): string {
+  return sessionStorage.getItem(keyOf(trialId)) ?? saved;
+}
+
+function keepDraft(trialId: number, text: string, saved: string): void {
+  if (text === saved) sessionStorage.removeItem(keyOf(trialId));
+  else sessionStorage.setItem(keyOf(trialId), text);
+}
+
+/** Forget the text that was saved, but not what has been typed since. */
+function forgetDraft(trialId: number, sent: string): void {
+  if (sessionStorage.getItem(keyOf(trialId)) === sent) sessionStorage.removeItem(keyOf(trialId));
 }
