@@ -19,12 +19,13 @@ import { FlightMarkers, PredictionResult } from "../campaign/flights/FlightMarke
 import { FlightNotes } from "../campaign/flights/FlightNotes";
 import { AbortCause, FlightReview } from "../campaign/flights/FlightReview";
 import { FlightProblem } from "../campaign/next-flight/BeforeFlight";
-import { speedOf, wantsRehearsal } from "../campaign/next-flight/nextStep";
-import { SpeedSwitch, useSpeed } from "../campaign/next-flight/SpeedSwitch";
-import { isToldByVehicle, leftGainsText, sentenceOf } from "../campaign/verdict/verdict";
+import { wantsRehearsal } from "../campaign/next-flight/nextStep";
+import { SpeedSwitch } from "../campaign/next-flight/SpeedSwitch";
+import { speedOf, useSpeed } from "../campaign/next-flight/speed";
+import { sentenceOf } from "../campaign/verdict/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
-import { areReadBackSince, type FlyStep } from "./flyScreen";
+import { areReadBackSince, type FlyStep, isToldByVehicle, leftGainsText } from "./flyScreen";
 
 interface Props {
   campaign: Campaign;

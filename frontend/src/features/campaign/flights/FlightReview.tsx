@@ -13,7 +13,7 @@ import {
   otherClasses,
   type Suggestion,
   suggestedClass,
-} from "../verdict/verdict";
+} from "./review";
 
 const WORDS = { valid: "Mark valid", aborted: "Mark aborted", invalid: "Mark invalid" } as const;
 

@@ -10,7 +10,7 @@ import { Note } from "../../../ui/Note";
 import { FailureNotice } from "../../../ui/Notices";
 import { groundedReason } from "../../fleet/fleet";
 import { windowOf } from "../campaignSettings";
-import { isWithdrawnByOperator } from "../verdict/verdict";
+import { isWithdrawnByOperator } from "./nextStep";
 
 /** One line before a flight: how long it is scored, and so how long it flies. */
 export function FlightWindow({ definition }: { definition: Definition }) {

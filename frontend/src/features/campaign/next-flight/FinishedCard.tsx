@@ -16,7 +16,8 @@ import { useUnits } from "../../../ui/units";
 import { CloneForm } from "../../new-campaign/CloneForm";
 import { ArchiveCampaign } from "../EndCampaign";
 import { PromoteGains } from "../verdict/PromoteGains";
-import { confirmationOf, confirmationText, endingOf, VERDICTS } from "../verdict/verdict";
+import { VERDICTS } from "../verdict/verdict";
+import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
 import classes from "./NextFlight.module.css";
 
 const FURTHER_FLIGHTS = 3;

@@ -1,16 +1,16 @@
 import { Button, Loader, Stack, Text } from "@mantine/core";
-import { useState } from "react";
 import { useRecompute, useUploadRecord } from "../../../api/mutations";
-import { useCampaign, useProposal, useTrials } from "../../../api/queries";
-import type { Campaign, NextFlight, Trial } from "../../../api/types";
+import { useCampaign } from "../../../api/queries";
+import type { NextFlight } from "../../../api/types";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { ProposalCard } from "../proposal/ProposalCard";
 import type { ShowPreview } from "../proposal/useChosenFlight";
+import type { CampaignStatus } from "../useCampaignStatus";
 import { FinishedCard } from "./FinishedCard";
 import { FlyingCard } from "./FlyingCard";
 import classes from "./NextFlight.module.css";
-import { hasLanded, nextStep } from "./nextStep";
+import { nextStep } from "./nextStep";
 import { PlannedCard } from "./PlannedCard";
 import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
 
@@ -113,33 +113,4 @@ function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight
       </Stack>
     </Panel>
   );
-}
-
-/** A consistent set of a campaign, its trials and its next flight. */
-export interface CampaignStatus {
-  campaign: Campaign;
-  trials: readonly Trial[];
-  next: NextFlight;
-}
-
-/** Null until all parts are loaded. Keeps the last consistent set while a part is stale, so that the page does not ask
- * for a review that was just given or offer superseded gains. */
-export function useCampaignStatus(campaignId: number): CampaignStatus | null {
-  const campaign = useCampaign(campaignId);
-  const trials = useTrials(campaignId);
-  const next = useProposal(campaignId);
-  const [held, setHeld] = useState<CampaignStatus | null>(null);
-  const parts = { campaign: campaign.data, trials: trials.data, next: next.data };
-  const areNew = [campaign, trials, next].every(({ isStale, error }) => !isStale || error !== null);
-  const areOther = parts.campaign !== held?.campaign || parts.trials !== held?.trials || parts.next !== held?.next;
-  if (areNew && areOther && isKnown(parts)) setHeld(parts);
-  // A landing is shown at once: a landed flight must not be shown as flying.
-  if (held !== null && parts.trials !== undefined && hasLanded(held.campaign, parts.trials)) {
-    return { ...held, trials: parts.trials };
-  }
-  return held;
-}
-
-function isKnown(parts: { [Part in keyof CampaignStatus]: CampaignStatus[Part] | undefined }): parts is CampaignStatus {
-  return parts.campaign !== undefined && parts.trials !== undefined && parts.next !== undefined;
 }

@@ -12,8 +12,9 @@ import { FlightMarkers } from "../flights/FlightMarkers";
 import { ImportRecord } from "../flights/ImportRecord";
 import { FlightProblem, FlightWindow, GroundedNote, useGroundedReason } from "./BeforeFlight";
 import classes from "./NextFlight.module.css";
-import { speedOf, watched } from "./nextStep";
-import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
+import { watched } from "./nextStep";
+import { SpeedSwitch } from "./SpeedSwitch";
+import { speedOf, useSpeed } from "./speed";
 
 /** Letters of a gain's name, above which it needs a wider tile. */
 const LONG = 8;

@@ -1,16 +1,5 @@
 import { Group, SegmentedControl } from "@mantine/core";
-import { useLocalStorage } from "@mantine/hooks";
-import { SPEEDS } from "./nextStep";
-
-/** The selected simulation speed, stored on this device. */
-export function useSpeed(): [string, (value: string) => void] {
-  const [value, setValue] = useLocalStorage({
-    key: "gainline-speed",
-    defaultValue: "10",
-    getInitialValueInEffect: false,
-  });
-  return [value, setValue];
-}
+import { SPEEDS } from "./speed";
 
 export function SpeedSwitch({ value, onChange }: { value: string; onChange: (value: string) => void }) {
   return (

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Campaign, NextFlight, Proposal, Trial } from "../../../api/types";
-import { flyingStage, nextStep, STAGED, speedOf } from "./nextStep";
+import { flyingStage, isWithdrawnByOperator, nextStep, STAGED } from "./nextStep";
 
 const campaign = {
   state: "deciding",
@@ -80,6 +80,12 @@ test("a finished campaign offers no flight", () => {
   expect(nextStep({ ...campaign, state: "finished" }, ready, [])).toEqual({ kind: "finished" });
 });
 
-test("the speed is ten times life unless somebody chose another", () => {
-  expect([speedOf("1"), speedOf("10"), speedOf("max"), speedOf("nonsense")]).toEqual([1, 10, null, 10]);
+test("a flight that the operator unstaged did not fail", () => {
+  const flight = (state: string, by?: string) =>
+    ({ flight: { id: 1, state, end: { request: by === undefined ? null : { by } } } }) as Trial;
+  expect(isWithdrawnByOperator(flight("cancelled", "operator"))).toBe(true);
+  expect(isWithdrawnByOperator(flight("cancelled", "another browser"))).toBe(false);
+  expect(isWithdrawnByOperator(flight("cancelled"))).toBe(false);
+  expect(isWithdrawnByOperator(flight("failed"))).toBe(false);
+  expect(isWithdrawnByOperator({ flight: null })).toBe(false);
 });

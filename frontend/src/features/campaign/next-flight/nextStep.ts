@@ -59,15 +59,6 @@ function offered(proposal: Proposal): NextStep {
   return { kind: "propose", proposal };
 }
 
-/** Simulated time over wall time; null: as fast as possible. */
-export type Speed = 1 | 10 | null;
-
-export const SPEEDS: readonly { value: string; label: string; speed: Speed }[] = [
-  { value: "1", label: "1×", speed: 1 },
-  { value: "10", label: "10×", speed: 10 },
-  { value: "max", label: "Max", speed: null },
-];
-
 /** Shows the top of the page, where the flight is watched, once it has begun; a refusal is told where it was ordered. */
 export function watched(flight: Promise<unknown>): void {
   flight.then(
@@ -76,7 +67,7 @@ export function watched(flight: Promise<unknown>): void {
   );
 }
 
-export function speedOf(value: string): Speed {
-  const found = SPEEDS.find((one) => one.value === value);
-  return found === undefined ? 10 : found.speed;
+/** Whether the operator withdrew the last flight before it took off, as by unstaging. */
+export function isWithdrawnByOperator({ flight }: Pick<Trial, "flight">): boolean {
+  return flight !== null && flight.state === "cancelled" && flight.end?.request?.by === "operator";
 }

@@ -2,7 +2,7 @@ import { TextInput } from "@mantine/core";
 import { Fragment } from "react";
 import { gainText } from "../../../ui/format";
 import classes from "../next-flight/NextFlight.module.css";
-import { changeText, type GainRow, placeIn, sliderStep } from "./choices";
+import { changeText, type GainRow, placeIn, sliderStep } from "./gainRows";
 
 export interface GainEntry {
   texts: Readonly<Record<string, string>>;

@@ -15,8 +15,9 @@ import type {
 } from "../../../api/types";
 import { typed, typedGain } from "../../../ui/format";
 import { watched } from "../next-flight/nextStep";
-import { type ChoiceName, type GainRow, gainRows, isOutside, preselected, readGains, trialOf } from "./choices";
+import { type ChoiceName, preselected, trialOf } from "./choices";
 import type { GainEntry } from "./GainTable";
+import { type GainRow, gainRows, isOutside, readGains } from "./gainRows";
 
 /** What the charts draw in place of the proposal. */
 export interface Preview {

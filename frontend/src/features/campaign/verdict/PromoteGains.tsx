@@ -9,7 +9,7 @@ import { gainsInBrackets, sameHeld } from "../../../ui/gains";
 import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
 import classes from "../next-flight/NextFlight.module.css";
-import { heldGainsNotice, promotable } from "./verdict";
+import { heldGainsNotice, promotable } from "./promotion";
 
 /** Set the best gains as the vehicle's safe gains, once flights have shown that they are better. */
 export function PromoteGains({ campaign }: { campaign: Campaign }) {

@@ -21,22 +21,14 @@ import { useHasModel } from "../../../ui/units";
 import { FlightMarkers, PredictionResult } from "../flights/FlightMarkers";
 import { FlightNotes, type NotePin } from "../flights/FlightNotes";
 import { AbortCause, FlightReview } from "../flights/FlightReview";
+import { standingWithout } from "../flights/review";
 import { comparisonAddress } from "../flights/useSelectedFlights";
-import { speedOf, watched } from "../next-flight/nextStep";
-import { useSpeed } from "../next-flight/SpeedSwitch";
+import { watched } from "../next-flight/nextStep";
+import { speedOf, useSpeed } from "../next-flight/speed";
+import { scatterMeaning } from "../statistics/scatter";
 import { PromoteGains } from "./PromoteGains";
 import classes from "./VerdictPanel.module.css";
-import {
-  bestBeforeOf,
-  bestBeforeTitle,
-  comparedWith,
-  isScored,
-  repeatPurpose,
-  scatterMeaning,
-  sentenceOf,
-  standingWithout,
-  VERDICTS,
-} from "./verdict";
+import { bestBeforeOf, bestBeforeTitle, comparedWith, isScored, repeatPurpose, sentenceOf, VERDICTS } from "./verdict";
 
 interface Props {
   trial: Trial;
