@@ -1,7 +1,7 @@
 import { IconAlertTriangle, IconCircleArrowDown, IconCircleArrowUp, IconCircleCheck } from "@tabler/icons-react";
 import type { Trial } from "../../../api/types";
-import classes from "../verdict/VerdictPanel.module.css";
 import { marksOf, predictionResult } from "../verdict/verdict";
+import classes from "./FlightMarkers.module.css";
 
 /** Markers of special flights: refused gains that were flown, glitches in the record. */
 export function FlightMarkers({ trial }: { trial: Trial }) {

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../../api/records";
 import type { Trial } from "../../../api/types";
 import { ErrorNotice } from "../../../ui/Notices";
-import classes from "../verdict/VerdictPanel.module.css";
+import classes from "./FlightNotes.module.css";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
 const LONGEST_NOTE = 2000;

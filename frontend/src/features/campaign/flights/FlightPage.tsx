@@ -9,10 +9,10 @@ import { grouped } from "../../../ui/format";
 import { NotFound, NotFoundPage } from "../../../ui/NotFound";
 import { useUnits } from "../../../ui/units";
 import { useTitle } from "../../../ui/useTitle";
-import classes from "../CampaignPage.module.css";
 import { GateChecks } from "../proposal/Gate";
 import { VerdictPanel } from "../verdict/VerdictPanel";
 import type { NotePin } from "./FlightNotes";
+import classes from "./FlightPage.module.css";
 import { useFlightKeys } from "./useFlightKeys";
 
 export function FlightPage() {

@@ -4,7 +4,7 @@ import { useClassify, useJudgeAbort } from "../../../api/mutations";
 import { problemOf, reasonsByField } from "../../../api/problems";
 import type { Campaign, Trial } from "../../../api/types";
 import { ErrorNotice } from "../../../ui/Notices";
-import classes from "../verdict/VerdictPanel.module.css";
+import classes from "./FlightReview.module.css";
 import {
   abortSentence,
   abortWords,
