@@ -1,15 +1,16 @@
 import { expect, test } from "vitest";
 import { nextOrder, sortedBy, toggled } from "./flightsTable";
 
-const runs = [
+const flights = [
   { number: 1, error: 0.3 },
   { number: 2, error: null },
   { number: 3, error: 0.1 },
   { number: 4, error: 0.3 },
 ];
-const numbers = (descending: boolean) => sortedBy(runs, ({ error }) => error, descending).map(({ number }) => number);
+const numbers = (descending: boolean) =>
+  sortedBy(flights, ({ error }) => error, descending).map(({ number }) => number);
 
-test("runs sort by a value, equal ones by their number, and those without one come last both ways", () => {
+test("flights sort by a value, equal ones by their number, and those without one come last both ways", () => {
   expect(numbers(false)).toEqual([3, 1, 4, 2]);
   expect(numbers(true)).toEqual([1, 4, 3, 2]);
   expect(sortedBy(["b", "a"], (text) => text, false)).toEqual(["a", "b"]);
