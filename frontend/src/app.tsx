@@ -3,7 +3,7 @@ import { Route, Routes } from "react-router";
 import { ApiError, PAGE_MISSING } from "./api/problems";
 import { loadPlotly } from "./charts/plotly";
 import { CampaignPage } from "./features/campaign/CampaignPage";
-import { CampaignsPage } from "./features/campaigns/CampaignsPage";
+import { CampaignListPage } from "./features/campaign-list/CampaignListPage";
 import { AppFrame } from "./frame/AppFrame";
 import type * as PageModule from "./pages";
 import { NotFoundPage } from "./ui/NotFound";
@@ -27,7 +27,7 @@ export function App() {
   return (
     <Routes>
       <Route element={<AppFrame />}>
-        <Route index element={<CampaignsPage />} />
+        <Route index element={<CampaignListPage />} />
         <Route path="new" element={<NewCampaignPage />} />
         <Route path="campaigns/:campaignId" element={<CampaignPage />} />
         <Route path="campaigns/:campaignId/flights/:trialId" element={<FlightPage />} />

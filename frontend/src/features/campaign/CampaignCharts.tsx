@@ -9,7 +9,7 @@ import { FigurePanel } from "../../charts/FigurePanel";
 import { type NextFlight, withNextError, withNextGains } from "../../charts/nextFlight";
 import { openingTitle, type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
 import classes from "./CampaignPage.module.css";
-import type { Preview } from "./useNextFlight";
+import type { Preview } from "./proposal/useChosenFlight";
 
 /** Height of the lower charts: enough for a panel of each gain. */
 const LOWER_PX = 300;

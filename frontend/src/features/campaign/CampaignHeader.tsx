@@ -13,7 +13,7 @@ import { count } from "../../ui/format";
 import { ErrorNotice } from "../../ui/Notices";
 import { campaignStateLabel } from "../../ui/states";
 import classes from "./CampaignPage.module.css";
-import { settingsOf } from "./definition";
+import { settingsOf } from "./campaignSettings";
 
 /** Name, state, and the settings that proposals depend on. */
 export function CampaignHeader({ campaign }: { campaign: Campaign }) {

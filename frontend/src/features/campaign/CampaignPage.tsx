@@ -14,15 +14,16 @@ import { useTitle } from "../../ui/useTitle";
 import { ByFlightPanels, CurvesPanel, LandscapePanel } from "./CampaignCharts";
 import { CampaignHeader } from "./CampaignHeader";
 import classes from "./CampaignPage.module.css";
-import { FlightsPanel } from "./FlightsPanel";
-import { NextFlightCard, useCampaignStatus } from "./NextFlightCard";
-import { StatisticsPanel } from "./StatisticsPanel";
-import { useFlightKeys } from "./useFlightKeys";
-import type { Preview } from "./useNextFlight";
-import { useSelectedFlights } from "./useSelectedFlights";
+import { FlightsPanel } from "./flights/FlightsPanel";
+import { useFlightKeys } from "./flights/useFlightKeys";
+import { useSelectedFlights } from "./flights/useSelectedFlights";
+import { NextFlightCard } from "./next-flight/NextFlightCard";
+import type { Preview } from "./proposal/useChosenFlight";
+import { StatisticsPanel } from "./statistics/StatisticsPanel";
+import { useCampaignStatus } from "./useCampaignStatus";
 import { useTab } from "./useTab";
-import { VerdictPanel } from "./VerdictPanel";
-import { selectedTrial } from "./verdict";
+import { VerdictPanel } from "./verdict/VerdictPanel";
+import { shownTrial } from "./verdict/verdict";
 
 export function CampaignPage() {
   const campaignId = Number(useParams()["campaignId"]);
@@ -81,7 +82,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
   const unproposed = useProposal(campaign.id).error;
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
-  const shown = selectedTrial(trials, chosen, standing?.campaign ?? campaign);
+  const shown = shownTrial(trials, chosen, standing?.campaign ?? campaign);
   const watching = useReadOnlyReason(campaign.vehicle);
   const choose = useCallback(
     (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),

@@ -14,7 +14,7 @@ import { trialStateLabel } from "../../ui/states";
 import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { confidenceText, plusMinus } from "../../ui/uncertainty";
-import { VERDICTS } from "../campaign/verdict";
+import { VERDICTS } from "../campaign/verdict/verdict";
 import classes from "./Compare.module.css";
 import { againstFirst } from "./chosenFlights";
 

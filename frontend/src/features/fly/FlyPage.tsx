@@ -19,7 +19,7 @@ import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ReadOnlyNotice } from "../../ui/Notices";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { windowOf } from "../campaign/definition";
+import { windowOf } from "../campaign/campaignSettings";
 import { CommandResult, LandNow, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAirborneStep } from "./flyScreen";

@@ -15,16 +15,17 @@ import { sameHeld } from "../../ui/gains";
 import { HoldButton } from "../../ui/HoldButton";
 import { ErrorNotice } from "../../ui/Notices";
 import { trialStateLabel } from "../../ui/states";
-import { FlightMarkers, PredictionResult } from "../campaign/FlightMarkers";
-import { FlightNotes } from "../campaign/FlightNotes";
-import { FlightProblem } from "../campaign/FlightProblem";
-import { AbortCause, FlightReview } from "../campaign/FlightReview";
-import { speedOf, wantsRehearsal } from "../campaign/nextStep";
-import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
-import { isToldByVehicle, leftGainsText, sentenceOf } from "../campaign/verdict";
+import { FlightMarkers, PredictionResult } from "../campaign/flights/FlightMarkers";
+import { FlightNotes } from "../campaign/flights/FlightNotes";
+import { AbortCause, FlightReview } from "../campaign/flights/FlightReview";
+import { FlightProblem } from "../campaign/next-flight/BeforeFlight";
+import { wantsRehearsal } from "../campaign/next-flight/nextStep";
+import { SpeedSwitch } from "../campaign/next-flight/SpeedSwitch";
+import { speedOf, useSpeed } from "../campaign/next-flight/speed";
+import { sentenceOf } from "../campaign/verdict/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
-import { areReadBackSince, type FlyStep } from "./flyScreen";
+import { areReadBackSince, type FlyStep, isToldByVehicle, leftGainsText } from "./flyScreen";
 
 interface Props {
   campaign: Campaign;

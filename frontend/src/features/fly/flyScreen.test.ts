@@ -10,6 +10,8 @@ import {
   gainTicks,
   hasLanded,
   isAirborneStep,
+  isToldByVehicle,
+  leftGainsText,
   secondsLeft,
 } from "./flyScreen";
 
@@ -157,4 +159,20 @@ test("safe gains count as read back only after the lift-off", () => {
 test("the countdown ends with the record", () => {
   expect([secondsLeft(12.5, 30), secondsLeft(31, 30), secondsLeft(undefined, 30)]).toEqual([17.5, 0, null]);
   expect(secondsLeft(1, null)).toBeNull();
+});
+
+test("a flight that a pilot took over left its own gains on the vehicle", () => {
+  const left = (gains_left: "safe" | "other" | "flight" | "unknown") => leftGainsText({ end: { gains_left } });
+  expect(left("flight")).toContain("left with the flight's gains");
+  expect(left("unknown")).toContain("not known");
+  expect(left("other")).toContain("not on the vehicle");
+  expect(leftGainsText({ end: null })).toContain("not known");
+});
+
+test("how a flight ended is not repeated beside the quarantine that it led to", () => {
+  const trial = (failure: "F6" | "F8", given_reason = "") => ({ given_reason, end: { failure } });
+  expect(isToldByVehicle(trial("F8"), { state: "quarantined" })).toBe(true);
+  expect(isToldByVehicle(trial("F8"), { state: "ready" })).toBe(false);
+  expect(isToldByVehicle(trial("F8", "gust"), { state: "quarantined" })).toBe(false);
+  expect(isToldByVehicle(trial("F6"), { state: "quarantined" })).toBe(false);
 });

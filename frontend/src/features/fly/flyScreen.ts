@@ -175,3 +175,29 @@ export function secondsLeft(lastS: number | undefined, endS: number | null): num
   if (lastS === undefined || endS === null) return null;
   return Math.max(0, endS - lastS);
 }
+
+const LEFT = {
+  other: "The safe gains are not on the vehicle. Inspect it before the next flight.",
+  flight:
+    "The safe gains were not restored, because a pilot took control: the vehicle was left with the flight's gains. Once it has landed and its motors have stopped, restore them on the vehicle's page.",
+  unknown: "It is not known whether the safe gains were restored. Inspect the vehicle before the next flight.",
+} as const;
+
+/** Which gains a flight left on the vehicle whose safe gains were not read back after it. */
+export function leftGainsText({ end }: Pick<NonNullable<Trial["flight"]>, "end">): string {
+  const left = end?.gains_left ?? "unknown";
+  return LEFT[left === "safe" ? "unknown" : left];
+}
+
+/** Failures without a sentence of their own: what a quarantined vehicle says is the whole reason. */
+const EXPLAINED_BY_REMARKS: readonly string[] = ["F7", "F8"];
+
+/** Whether the vehicle's reason of quarantine is that of the flight's end too. */
+export function isToldByVehicle(
+  trial: Pick<Trial, "given_reason" | "end">,
+  { state }: Pick<Vehicle, "state">,
+): boolean {
+  return (
+    state === "quarantined" && trial.given_reason === "" && EXPLAINED_BY_REMARKS.includes(trial.end?.failure ?? "")
+  );
+}

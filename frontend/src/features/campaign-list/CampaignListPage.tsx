@@ -1,0 +1,117 @@
+import { Box, Button, Group, SegmentedControl, Skeleton, TextInput, Title } from "@mantine/core";
+import { useDebouncedValue } from "@mantine/hooks";
+import { IconPlus, IconSearch } from "@tabler/icons-react";
+import { useState } from "react";
+import { Link } from "react-router";
+import { useCampaigns, useCatalogue } from "../../api/queries";
+import type { Sort } from "../../api/types";
+import { SelectField } from "../../ui/Fields";
+import { ErrorNotice } from "../../ui/Notices";
+import work from "../../ui/Page.module.css";
+import { addPage } from "../../ui/paging";
+import { useTitle } from "../../ui/useTitle";
+import { CampaignCard } from "./CampaignCard";
+import classes from "./CampaignListPage.module.css";
+import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
+import { FirstCampaign } from "./FirstCampaign";
+import { ImportBundle } from "./ImportBundle";
+
+const SORTS: { value: Sort; label: string }[] = [
+  { value: "-updated", label: "Recently updated" },
+  { value: "-created", label: "Newest" },
+  { value: "created", label: "Oldest" },
+  { value: "name", label: "Name" },
+  { value: "error", label: "Lowest error" },
+];
+
+export function CampaignListPage() {
+  useTitle("Campaigns");
+  const [search, setSearch] = useState("");
+  const [state, setState] = useState<StateFilter>("all");
+  const [vehicle, setVehicle] = useState("");
+  const [sort, setSort] = useState<Sort>("-updated");
+  const [sought] = useDebouncedValue(search.trim(), 200);
+  const kinds = useCatalogue().data?.vehicle_kinds ?? [];
+  const filtered = sought !== "" || state !== "all" || vehicle !== "";
+  const campaigns = useCampaigns({ search: sought, state: statesFor(state), vehicle: vehicle ? [vehicle] : [], sort });
+  const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
+  const total = campaigns.data?.pages[0]?.total ?? 0;
+  if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
+  return (
+    <>
+      <Group gap={12} mb={14}>
+        <Title order={1} me="auto">
+          Campaigns
+        </Title>
+        <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
+          New campaign
+        </Button>
+        <ImportBundle />
+      </Group>
+      <search className={classes["filters"]}>
+        <TextInput
+          aria-label="Search campaigns by name"
+          placeholder="Search"
+          leftSection={<IconSearch size={18} aria-hidden />}
+          value={search}
+          onChange={(event) => setSearch(event.currentTarget.value)}
+        />
+        <SegmentedControl
+          aria-label="State"
+          size="md"
+          className={classes["states"]}
+          value={state}
+          onChange={(value) => setState(value as StateFilter)}
+          data={STATE_FILTERS}
+        />
+        <SelectField
+          aria-label="Vehicle"
+          data={[
+            { value: "", label: "All vehicles" },
+            ...kinds.map(({ name, title }) => ({ value: name, label: title })),
+          ]}
+          value={vehicle}
+          onChange={setVehicle}
+        />
+        <SelectField aria-label="Sort by" data={SORTS} value={sort} onChange={setSort} />
+      </search>
+      <ErrorNotice error={campaigns.error} />
+      {campaigns.isPending && (
+        <div className={classes["cards"]} aria-busy="true">
+          {[1, 2, 3].map((one) => (
+            <Skeleton key={one} height={250} radius="md" />
+          ))}
+        </div>
+      )}
+      {campaigns.data && found.length === 0 && (
+        <div className={work["none"]}>
+          <p>No campaigns match.</p>
+          {filtered && (
+            <Button
+              variant="default"
+              onClick={() => {
+                setSearch("");
+                setState("all");
+                setVehicle("");
+              }}
+            >
+              Show all campaigns
+            </Button>
+          )}
+        </div>
+      )}
+      <ul className={classes["cards"]} aria-label="Campaigns">
+        {found.map((campaign) => (
+          <CampaignCard key={campaign.id} campaign={campaign} />
+        ))}
+      </ul>
+      {campaigns.hasNextPage && (
+        <Box mt={20} ta="center">
+          <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
+            Show more ({found.length} of {total})
+          </Button>
+        </Box>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,76 @@
+import { Anchor, Button, Title } from "@mantine/core";
+import { IconPlus } from "@tabler/icons-react";
+import { Link, useNavigate } from "react-router";
+import { useCreateCampaign } from "../../api/mutations";
+import { useCatalogue } from "../../api/queries";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
+import { firstPreset } from "../new-campaign/newCampaign";
+import classes from "./FirstCampaign.module.css";
+import { ImportBundle } from "./ImportBundle";
+
+const STEPS = [
+  [
+    "Fly",
+    "The vehicle takes off with its default gains. The error is the mean distance from 3\u00a0m over 32.6\u00a0s.",
+  ],
+  ["Learn", "The flight is compared with a simple model, and the difference corrects the next prediction."],
+  ["Step", "Gainline proposes the best of many gain sets on the model. You see why, and decide."],
+] as const;
+
+/** Empty list: explains campaigns, and creates the first one with one click. */
+export function FirstCampaign() {
+  const navigate = useNavigate();
+  const catalogue = useCatalogue();
+  const create = useCreateCampaign();
+  const preset = catalogue.data && firstPreset(catalogue.data);
+  return (
+    <section className={classes["first"]}>
+      <Drawing />
+      <Title order={1} lh={1.15}>
+        Tune a takeoff in a few flights
+      </Title>
+      <Note maw={560} fz="strong" lh={1.5}>
+        A campaign flies one vehicle repeatedly, each time with new gains, and stops when no further improvement is
+        found.
+      </Note>
+      <ol className={classes["steps"]}>
+        {STEPS.map(([title, text]) => (
+          <li key={title}>
+            <strong>{title}</strong>
+            <span>{text}</span>
+          </li>
+        ))}
+      </ol>
+      <Button
+        size="lg"
+        classNames={{ root: classes["create"] ?? "", label: classes["createLabel"] ?? "" }}
+        loading={create.isPending}
+        disabled={preset === undefined}
+        leftSection={<IconPlus size={22} aria-hidden />}
+        onClick={() =>
+          preset && create.mutate(preset.campaign, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })
+        }
+      >
+        Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”
+      </Button>
+      <Anchor component={Link} to="/new" display="inline-block" py={12}>
+        Choose a preset or settings first
+      </Anchor>
+      <ImportBundle />
+      <ErrorNotice error={catalogue.error ?? create.error} />
+    </section>
+  );
+}
+
+/** Three takeoffs, each closer to the dotted set point. */
+function Drawing() {
+  return (
+    <svg viewBox="0 0 420 130" className={classes["drawing"]} aria-hidden>
+      <line x1="10" x2="410" y1="48" y2="48" className={classes["target"]} />
+      <path d="M10 120C46 120 56 12 96 12s64 46 122 34 60-34 102-22 52 20 90 22" className={classes["old"]} />
+      <path d="M10 120C42 120 52 28 86 28s50 30 94 24 70-8 230-4" className={classes["middle"]} />
+      <path d="M10 120C40 120 46 44 78 44s36 6 78 4 120 0 254 0" className={classes["best"]} />
+    </svg>
+  );
+}

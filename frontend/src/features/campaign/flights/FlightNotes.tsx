@@ -1,0 +1,153 @@
+import { Button, FileButton, Group, InputBase } from "@mantine/core";
+import { IconCamera, IconTrash } from "@tabler/icons-react";
+import { useEffect, useRef, useState } from "react";
+import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../../api/records";
+import type { Trial } from "../../../api/types";
+import { ErrorNotice } from "../../../ui/Notices";
+import classes from "./FlightNotes.module.css";
+
+const PICTURES = "image/jpeg,image/png,image/webp";
+const LONGEST_NOTE = 2000;
+const COUNTED_FROM = 1800;
+
+/** The time in the record, in seconds since the command, at which a line of the note is to be pinned. */
+export interface NotePin {
+  timeS: number;
+}
+
+interface Props {
+  trial: Trial;
+  /** A new pin adds its line to the note. */
+  pin?: NotePin | null;
+}
+
+/** Note and photos of a flight; a tablet takes photos with its camera. */
+export function FlightNotes({ trial, pin = null }: Props) {
+  const { data: photos = [], error } = usePhotos(trial.id);
+  const { add, remove } = usePhotoActions(trial.id);
+  const [asked, setAsked] = useState<number | null>(null);
+  const doomed = photos.findIndex(({ id }) => id === asked);
+  const [hasDraft] = useState(() => draftOf(trial.id, trial.note) !== trial.note);
+  const kept = hasDraft || trial.note !== "" || photos.length > 0 || pin !== null;
+  return (
+    <details className={classes["notes"]} open={kept || undefined}>
+      <summary>Note and photos</summary>
+      {/* The key keeps unsaved text when a review changes the trial's version. */}
+      <Note key={`${trial.id} ${trial.note}`} trial={trial} pin={pin} />
+      {photos.length > 0 && (
+        <ul className={classes["photos"]}>
+          {photos.map(({ id }, index) => (
+            <li key={id}>
+              <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
+                <img src={photoAddress(trial.id, id)} alt={`Flight ${trial.number}, ${index + 1}`} loading="lazy" />
+              </a>
+              <button
+                type="button"
+                aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
+                aria-expanded={id === asked}
+                onClick={() => setAsked(id === asked ? null : id)}
+              >
+                <IconTrash size={18} aria-hidden />
+              </button>
+            </li>
+          ))}
+        </ul>
+      )}
+      {asked !== null && doomed >= 0 && (
+        <Group gap={8}>
+          <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
+          <Button variant="default" onClick={() => setAsked(null)}>
+            Cancel
+          </Button>
+          <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
+            Delete photo {doomed + 1}
+          </Button>
+        </Group>
+      )}
+      <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
+        {(props) => (
+          <Button
+            {...props}
+            variant="default"
+            loading={add.isPending}
+            leftSection={<IconCamera size={20} aria-hidden />}
+          >
+            Add photo
+          </Button>
+        )}
+      </FileButton>
+      <ErrorNotice error={add.error ?? remove.error ?? error} />
+    </details>
+  );
+}
+
+function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
+  const [note, setNote] = useState(() => draftOf(trial.id, trial.note));
+  const text = useRef<HTMLTextAreaElement>(null);
+  const pinned = useRef(pin);
+  useEffect(() => {
+    if (pin === null || pinned.current === pin) return;
+    pinned.current = pin;
+    setNote((before) => withPin(before, pin.timeS));
+    text.current?.focus();
+  }, [pin]);
+  useEffect(() => keepDraft(trial.id, note, trial.note), [trial.id, trial.note, note]);
+  const save = useNote(trial, (sent) => forgetDraft(trial.id, sent));
+  const isTooLong = note.length > LONGEST_NOTE;
+  return (
+    <form
+      className={classes["note"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        save.mutate(note);
+      }}
+    >
+      <InputBase
+        component="textarea"
+        ref={text}
+        description="A line that starts with a time, such as “2.4 s: wobble”, is marked on the record chart."
+        multiline
+        label={`Note on flight ${trial.number}`}
+        rows={2}
+        error={isTooLong}
+        value={note}
+        onChange={(event) => setNote(event.currentTarget.value)}
+      />
+      {note.length >= COUNTED_FROM && (
+        <p role="status" className="numbers">
+          {note.length} of at most {LONGEST_NOTE} characters
+        </p>
+      )}
+      {note !== trial.note && (
+        <Button type="submit" loading={save.isPending} disabled={isTooLong}>
+          Save note
+        </Button>
+      )}
+      <ErrorNotice error={save.error} />
+    </form>
+  );
+}
+
+/** The note with another line, which begins with a time. */
+function withPin(note: string, timeS: number): string {
+  const before = note.trimEnd();
+  return `${before}${before && "\n"}${timeS.toFixed(1)} s: `;
+}
+
+/** Unsaved notes, by flight: kept in this tab while other pages are open. */
+const keyOf = (trialId: number): string => `note ${trialId}`;
+
+/** The unsaved text of a flight's note, else the saved one. */
+function draftOf(trialId: number, saved: string): string {
+  return sessionStorage.getItem(keyOf(trialId)) ?? saved;
+}
+
+function keepDraft(trialId: number, text: string, saved: string): void {
+  if (text === saved) sessionStorage.removeItem(keyOf(trialId));
+  else sessionStorage.setItem(keyOf(trialId), text);
+}
+
+/** Forget the text that was saved, but not what has been typed since. */
+function forgetDraft(trialId: number, sent: string): void {
+  if (sessionStorage.getItem(keyOf(trialId)) === sent) sessionStorage.removeItem(keyOf(trialId));
+}

@@ -1,0 +1,72 @@
+import { Button, FileButton, Stack } from "@mantine/core";
+import { IconFileUpload } from "@tabler/icons-react";
+import type { RecordOrder, RecordUpload } from "../../../api/mutations";
+import { problemOf } from "../../../api/problems";
+import { confirmationIn, RECORD_FILES, recordOf, takeoffsIn } from "../../../api/records";
+import type { NewTrial } from "../../../api/types";
+import { Note } from "../../../ui/Note";
+import { ErrorNotice } from "../../../ui/Notices";
+
+interface Props {
+  upload: RecordUpload;
+  trialId?: number;
+  /** Planned with the record, without a `trialId`; the record can be uploaded once one of them is there. */
+  plan?: NewTrial;
+}
+
+const ACCEPT = { confirm: "Import with the gains in the log", invalid: "Store as an invalid flight" };
+
+/** Upload of the record of a flight made elsewhere with these gains. */
+export function ImportRecord({ upload, trialId, plan }: Props) {
+  const target = {
+    ...(trialId === undefined ? {} : { trialId }),
+    ...(plan === undefined ? {} : { plan }),
+  };
+  const problem = problemOf(upload.error);
+  const accepting = confirmationIn(problem);
+  const again = (answer: Partial<RecordOrder>) =>
+    upload.variables !== undefined && upload.mutate({ ...upload.variables, ...target, ...answer });
+  return (
+    <Stack gap={14}>
+      <Note fz="body">
+        Set these gains on your vehicle, fly, and upload the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
+        .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the takeoff command)
+        and <code>altitude_m</code>.
+      </Note>
+      <FileButton
+        multiple
+        accept={RECORD_FILES}
+        onChange={(files) => {
+          const record = recordOf(files);
+          if (record !== null) upload.mutate({ ...record, ...target });
+        }}
+      >
+        {(props) => (
+          <Button
+            {...props}
+            fullWidth
+            size="lg"
+            loading={upload.isPending}
+            disabled={trialId === undefined && plan === undefined}
+            leftSection={<IconFileUpload size={22} aria-hidden />}
+          >
+            Upload flight record
+          </Button>
+        )}
+      </FileButton>
+      <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid"]} />
+      {takeoffsIn(problem).map(({ number, summary }) => (
+        <Button key={number} variant="default" h="auto" py="xs" onClick={() => again({ takeoff: number })}>
+          <span style={{ whiteSpace: "normal" }}>
+            Takeoff {number}: {summary}
+          </span>
+        </Button>
+      ))}
+      {accepting !== null && (
+        <Button variant="default" onClick={() => again({ [accepting]: true })}>
+          {ACCEPT[accepting]}
+        </Button>
+      )}
+    </Stack>
+  );
+}

@@ -1,0 +1,29 @@
+import { useCallback, useState } from "react";
+import { useNavigate } from "react-router";
+import type { Trial } from "../../../api/types";
+import { useKeys } from "../../../frame/useKeys";
+import { wasFlown } from "../../../ui/states";
+import { toggled } from "./flightsTable";
+
+export interface SelectedFlights {
+  selected: readonly number[];
+  onSelect: (trialId: number) => void;
+}
+
+/** The flights of a campaign that are selected for comparison, and the keys that select the shown one and compare. */
+export function useSelectedFlights(campaignId: number, shown: Trial | null): SelectedFlights {
+  const [selected, setSelected] = useState<readonly number[]>([]);
+  const navigate = useNavigate();
+  const onSelect = useCallback((trialId: number) => setSelected((before) => toggled(before, trialId)), []);
+  useKeys({
+    select: () => shown !== null && wasFlown(shown.state) && onSelect(shown.id),
+    compare: () => void navigate(comparisonAddress(campaignId, selected)),
+  });
+  return { selected, onSelect };
+}
+
+/** Address of the comparison of these flights, in the order of selection: the first is the reference. */
+export function comparisonAddress(campaignId: number, trialIds: readonly number[]): string {
+  const trials = trialIds.map((trial): [string, string] => ["trial", String(trial)]);
+  return `/compare?${new URLSearchParams([["campaign", String(campaignId)], ...trials])}`;
+}

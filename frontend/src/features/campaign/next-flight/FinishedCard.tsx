@@ -1,0 +1,143 @@
+import { Button, Stack } from "@mantine/core";
+import { IconRepeat } from "@tabler/icons-react";
+import { useGateRefusal } from "../../../api/evaluation";
+import { useReopen } from "../../../api/mutations";
+import { useStatistics } from "../../../api/queries";
+import type { Campaign, CampaignStatistics, RepeatGroup } from "../../../api/types";
+import { Aside } from "../../../ui/Aside";
+import { against, count, flightsText, percentChange } from "../../../ui/format";
+import { GainList } from "../../../ui/gains";
+import { Note } from "../../../ui/Note";
+import { ErrorNotice } from "../../../ui/Notices";
+import { Panel } from "../../../ui/Panel";
+import { campaignStateLabel } from "../../../ui/states";
+import { confidenceText, plusMinus } from "../../../ui/uncertainty";
+import { useUnits } from "../../../ui/units";
+import { CloneForm } from "../../new-campaign/CloneForm";
+import { ArchiveCampaign } from "../EndCampaign";
+import { PromoteGains } from "../verdict/PromoteGains";
+import { VERDICTS } from "../verdict/verdict";
+import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
+import classes from "./NextFlight.module.css";
+
+const FURTHER_FLIGHTS = 3;
+
+const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meaning: string }> = {
+  candidate: { word: "Candidate", meaning: "not yet confirmed by repeat flights." },
+  confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
+  "not confirmed": { word: "Not confirmed", meaning: "no improvement over the first gains in repeat flights." },
+};
+
+interface Props {
+  campaign: Campaign;
+  onChoose: (trialNumber: number) => void;
+  /** Whether another card has the next action. */
+  isSecondary: boolean;
+}
+
+/** The campaign's result, and its next actions. */
+export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
+  const reopen = useReopen(campaign.id);
+  const { data: statistics, isPending } = useStatistics(campaign.id);
+  const groups = statistics?.groups ?? [];
+  const [winner, first] = [groups.find(({ is_best }) => is_best), groups.find(({ is_baseline }) => is_baseline)];
+  const missing = campaign.standing === "candidate" ? confirmationOf(winner, first) : [];
+  const wanted = missing.flatMap((kind) => (kind === "repeat" ? winner : first) ?? []).map(({ gains }) => gains);
+  const refusal = useGateRefusal(campaign.id, wanted);
+  const isCandidate = missing.length > 0 && refusal === "";
+  const further = isCandidate ? missing.length : FURTHER_FLIGHTS;
+  const experiment = campaign.definition.experiment ?? "";
+  const bestFlight = winner === undefined ? null : bestFlightOf(winner);
+  const title = campaignStateLabel({ ...campaign, state: "finished", rehearsal: "not needed" }).word;
+  const reason = endingOf(campaign, statistics?.comparison ?? null);
+  return (
+    <Panel title={title}>
+      <Stack gap={14}>
+        {reason.toLowerCase() !== title.toLowerCase() && <Note fz="body">{reason}</Note>}
+        {winner !== undefined && first !== undefined && (
+          <Result campaign={campaign} winner={winner} first={first} comparison={statistics?.comparison ?? null} />
+        )}
+        {statistics?.drift?.resolved && (
+          <Aside tone="warn" fz="small">
+            {statistics.drift.sentence}
+          </Aside>
+        )}
+        {isCandidate && <Note fz="body">{confirmationText(missing)}</Note>}
+        {refusal !== "" && !reason.includes(refusal) && (
+          <Note fz="body">
+            The best gains cannot be confirmed: the gate refuses another flight that it needs. {refusal}
+          </Note>
+        )}
+        {campaign.actions.includes("reopen") && !isPending && (
+          <Button
+            variant={isCandidate && !isSecondary ? "filled" : "default"}
+            leftSection={<IconRepeat size={20} aria-hidden />}
+            loading={reopen.isPending}
+            onClick={() => reopen.mutate({ flights: further, plan: missing })}
+          >
+            {isCandidate ? `Confirm with ${count(further, "flight")}` : `Reopen for ${further} more flights`}
+          </Button>
+        )}
+        <ErrorNotice error={reopen.error} />
+        {bestFlight !== null && (
+          <Button variant="default" onClick={() => onChoose(bestFlight)}>
+            Show flight {bestFlight}
+          </Button>
+        )}
+        <PromoteGains campaign={campaign} />
+        <Note fz="body">A clone is a new campaign with the same settings.</Note>
+        <CloneForm {...campaign} experiment={experiment} bestFlight={bestFlight} />
+        {campaign.actions.includes("archive") && <ArchiveCampaign campaignId={campaign.id} />}
+      </Stack>
+    </Panel>
+  );
+}
+
+/** Number of the flight with the lowest error, the earliest of equals. */
+function bestFlightOf({ trial_numbers, errors }: RepeatGroup): number | null {
+  return trial_numbers[errors.indexOf(Math.min(...errors))] ?? null;
+}
+
+interface ResultProps {
+  campaign: Campaign;
+  winner: RepeatGroup;
+  first: RepeatGroup;
+  comparison: CampaignStatistics["comparison"];
+}
+
+/** The best gains beside the first, each with the mean of all its flights. */
+function Result({ campaign, winner, first, comparison }: ResultProps) {
+  const experiment = campaign.definition.experiment ?? "";
+  const unit = useUnits(experiment).error;
+  const change = percentChange(winner.mean, first.mean);
+  return (
+    <Aside tone="good" className={`${classes["best"]} numbers`}>
+      <p>Best gains ({flightsText(winner.trial_numbers)})</p>
+      <p className={classes["figure"]}>{plusMinus(winner.mean, winner.standard_error, unit)}</p>
+      {winner.standard_error !== null && <p>{winner.errors.length > 1 ? "mean " : ""}± standard error</p>}
+      <p>
+        <GainList gains={winner.gains} experiment={experiment} />
+      </p>
+      {change !== null && comparison !== null && (
+        <>
+          <p>
+            First gains ({flightsText(first.trial_numbers)}):{" "}
+            <span className="quantity">{plusMinus(first.mean, first.standard_error, unit)}</span>
+          </p>
+          <p>
+            {against(change, "the first gains")} ·{" "}
+            <strong>
+              {VERDICTS[comparison.verdict].toLowerCase()}
+              {comparison.confidence !== null && ` with ${confidenceText(comparison.confidence)} confidence`}
+            </strong>
+          </p>
+        </>
+      )}
+      {campaign.standing !== null && (
+        <p>
+          <strong>{STANDINGS[campaign.standing].word}</strong>: {STANDINGS[campaign.standing].meaning}
+        </p>
+      )}
+    </Aside>
+  );
+}

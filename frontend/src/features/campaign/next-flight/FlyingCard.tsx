@@ -1,0 +1,89 @@
+import { Button, Stack } from "@mantine/core";
+import { Link, useOutletContext } from "react-router";
+import type { Campaign, Trial } from "../../../api/types";
+import { type AbortControl, abortStage, abortText, isCutShort } from "../../../live/flights";
+import { useConnection, useIsOutputCurrent, useLiveFlight, useVehicleStatus } from "../../../live/store";
+import { isSaturated, outputNow, readingOf, throttleNow } from "../../../live/telemetry";
+import { isAfterRecord } from "../../../live/vehicleStatus";
+import { withUnit } from "../../../ui/format";
+import { GainList } from "../../../ui/gains";
+import { Note } from "../../../ui/Note";
+import { Panel } from "../../../ui/Panel";
+import { intervalText, percentOrNothing } from "../../../ui/uncertainty";
+import { useUnits } from "../../../ui/units";
+import { FlightMarkers } from "../flights/FlightMarkers";
+import classes from "./NextFlight.module.css";
+import { flyingStage, STAGED } from "./nextStep";
+
+interface Props {
+  campaign: Campaign;
+  trial: Trial | undefined;
+  step: { trialId: number; trialNumber: number };
+}
+
+/** Live values of the flight in progress. The ABORT button is in the header of every page. */
+export function FlyingCard({ campaign, trial, step }: Props) {
+  const abort = useOutletContext<AbortControl>();
+  const { state, worker } = useConnection();
+  const live = useLiveFlight(step.trialId);
+  const unit = useUnits(campaign.definition.experiment ?? "").error;
+  const reading = readingOf(live?.channel ?? "altitude_m");
+  const { registered } = campaign.vehicle;
+  const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
+  const aborting = abortStage(step.trialId, abort, status?.status.step);
+  const isUnscored = isCutShort(aborting, status?.status.step);
+  const stage = flyingStage(trial, live);
+  const isAfter = isAfterRecord(status?.status.step);
+  const hasOutput = isAfter || (live !== null && live.timeS.length > 0);
+  const isStale = !useIsOutputCurrent(live, status) && hasOutput;
+  return (
+    <Panel
+      title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
+      tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
+    >
+      <Stack gap={14}>
+        <dl className={`${classes["big"]} numbers`}>
+          <div className={classes["reading"]} data-wide data-stale={isStale || undefined}>
+            <dt>{isStale ? `${reading.title}, last known` : reading.title}</dt>
+            <dd>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</dd>
+          </div>
+          <div className={classes["reading"]} data-stale={isStale || undefined}>
+            <dt>{isUnscored ? "Error" : "Error so far"}</dt>
+            <dd>{isUnscored ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
+          </div>
+          <div className={classes["reading"]}>
+            <dt>Predicted error</dt>
+            <dd>
+              {withUnit(trial?.predicted_error, unit)}{" "}
+              {trial?.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
+            </dd>
+          </div>
+          <div className={classes["reading"]} data-stale={isStale || undefined}>
+            <dt>Time</dt>
+            <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
+          </div>
+          {live !== null && live.throttle !== null && (
+            <div className={classes["reading"]} data-stale={isStale || undefined}>
+              <dt>{isSaturated(live) && !isAfter ? "Throttle, saturated" : "Throttle"}</dt>
+              <dd>{percentOrNothing(throttleNow(live, status))}</dd>
+            </div>
+          )}
+        </dl>
+        {trial && (
+          <Note fz="body" className="numbers">
+            <GainList gains={trial.gains} experiment={campaign.definition.experiment ?? ""} />
+            {trial.read_back && ", read back from the vehicle"}
+          </Note>
+        )}
+        {registered && (
+          <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
+            Open fly screen
+          </Button>
+        )}
+        {stage !== STAGED && (
+          <Note fz="body">{abortText(aborting, state === "live" && worker, status?.isCurrent === false)}</Note>
+        )}
+      </Stack>
+    </Panel>
+  );
+}

@@ -1,0 +1,32 @@
+/** Why a campaign ended, and the flights that would confirm its result. */
+
+import type { Campaign, CampaignStatistics, RepeatGroup } from "../../../api/types";
+import { count } from "../../../ui/format";
+
+type Repeated = Pick<RepeatGroup, "errors">;
+type Variant = "repeat" | "baseline";
+
+/** The flights that are missing until the best and the first gains have each flown twice. */
+export function confirmationOf(winner: Repeated | undefined, first: Repeated | undefined): Variant[] {
+  const missing = (variant: Variant, group: Repeated | undefined) =>
+    Array<Variant>(group === undefined ? 0 : Math.max(0, 2 - group.errors.length)).fill(variant);
+  return [...missing("repeat", winner), ...missing("baseline", first)];
+}
+
+/** What the flights of a confirmation are for. */
+export function confirmationText(plan: readonly Variant[]): string {
+  const of = (variant: Variant, gains: string) => {
+    const flights = plan.filter((one) => one === variant).length;
+    return flights === 0 ? [] : [`${count(flights, "more flight")} with the ${gains} gains`];
+  };
+  const parts = [...of("repeat", "best"), ...of("baseline", "first")];
+  return `The best and the first gains must each be flown at least twice: ${parts.join(" and ")}.`;
+}
+
+/** Why the campaign ended, without the verdict, which is shown beside it. */
+export function endingOf(
+  { stop_reason: reason }: Pick<Campaign, "stop_reason">,
+  comparison: Pick<NonNullable<CampaignStatistics["comparison"]>, "sentence"> | null,
+): string {
+  return comparison === null ? reason : reason.replace(comparison.sentence, "").replaceAll("  ", " ").trim();
+}

@@ -1,0 +1,69 @@
+import { describe, expect, test } from "vitest";
+import type { FlightChoice, Proposal } from "../../../api/types";
+import { isDoubtful, preselected, refusalOf, repeatSource, trialOf } from "./choices";
+
+const first = { kp: 283, ki: 13 };
+const best = { kp: 900, ki: 200 };
+const next = { kp: 1200, ki: 250 };
+
+function choice(kind: FlightChoice["kind"], gains: Record<string, number>, more: Partial<FlightChoice> = {}) {
+  return { kind, gains, proposed: false, recommended: false, ...more };
+}
+
+const step = choice("step", next, { proposed: true });
+const repeat = choice("repeat", best);
+
+function proposal(...choices: FlightChoice[]): Proposal {
+  return { id: 7, gains: next, choices } as unknown as Proposal;
+}
+
+describe("what is chosen at first", () => {
+  test("is what is recommended", () => {
+    expect(preselected(proposal(step, { ...repeat, recommended: true }))).toBe("repeat");
+  });
+
+  test("is the proposal where the campaign should stop", () => {
+    expect(preselected(proposal(step, repeat))).toBe("step");
+  });
+});
+
+describe("what the button flies", () => {
+  test("is the proposal by its number, so that the flight keeps the prediction", () => {
+    expect(trialOf(proposal(step), step, next)).toEqual({ proposal_id: 7 });
+  });
+
+  test("is a variant with the gains that are shown, so that no others fly", () => {
+    expect(trialOf(proposal(step, repeat), repeat, best)).toEqual({ variant: "repeat", gains: best });
+  });
+
+  test("is the gains that were typed", () => {
+    expect(trialOf(proposal(step), undefined, first)).toEqual({ gains: first });
+  });
+});
+
+test("a repeat says of which flights it predicts the mean", () => {
+  expect(repeatSource("repeat", { trial_numbers: [2, 3] })).toBe("mean of flights 2, 3 with these gains");
+  expect(repeatSource("baseline", { trial_numbers: [1] })).toBe("error of flight 1 with these gains");
+  expect(repeatSource("step", { trial_numbers: [1] })).toBe("");
+});
+
+test("start gains that were aborted because of them are doubtful", () => {
+  const baseline = { kind: "baseline", gains: {}, proposed: true, recommended: false } as const;
+  expect(isDoubtful({ kind: "start", choices: [baseline] })).toBe(true);
+  expect(isDoubtful({ kind: "start", choices: [{ ...baseline, recommended: true }] })).toBe(false);
+  expect(isDoubtful({ kind: "step", choices: [baseline] })).toBe(false);
+});
+
+test("a refusal names the gains, the reasons, and what would pass", () => {
+  const bare = { worst: null, limit: null, gain: "", case: "", offer: {} };
+  const outside = { gain: "kp", offer: { kp: 4000 } };
+  const checks = [
+    { ...bare, name: "bounds", passed: false, sentence: "kp must be between 0 and 4000.", ...outside },
+    { ...bare, name: "altitude", passed: false, sentence: "It rises to 9 m." },
+    { ...bare, name: "wrapping", passed: true, sentence: "No product can wrap." },
+  ];
+  expect(refusalOf({ passed: false, checks }).problems).toEqual([
+    { field: "gains.kp", reason: "kp must be between 0 and 4000.", offer: { kp: 4000 } },
+    { field: "gains", reason: "It rises to 9 m." },
+  ]);
+});

@@ -1,0 +1,73 @@
+import { Button, TextInput } from "@mantine/core";
+import { IconShieldCheck } from "@tabler/icons-react";
+import { useState } from "react";
+import { usePromote } from "../../../api/mutations";
+import { problemOf, reasonsByField } from "../../../api/problems";
+import type { Campaign } from "../../../api/types";
+import { useVehicle } from "../../../api/vehicles";
+import { gainsInBrackets, sameHeld } from "../../../ui/gains";
+import { Note } from "../../../ui/Note";
+import { ErrorNotice } from "../../../ui/Notices";
+import classes from "../next-flight/NextFlight.module.css";
+import { heldGainsNotice, promotable } from "./promotion";
+
+/** Set the best gains as the vehicle's safe gains, once flights have shown that they are better. */
+export function PromoteGains({ campaign }: { campaign: Campaign }) {
+  const [asking, setAsking] = useState(false);
+  const [statement, setStatement] = useState("");
+  const promote = usePromote(campaign);
+  const vehicle = useVehicle(campaign.vehicle.registered ? campaign.vehicle.id : null);
+  if (vehicle === null || campaign.winner === null) return null;
+  const { possible, why } = promotable(campaign.winner, vehicle);
+  if (!possible) {
+    const isDone = sameHeld(vehicle.safe_gains, campaign.winner.gains);
+    return (
+      <Note fz="body">
+        {why} {isDone && campaign.flying === null && heldGainsNotice(vehicle)}
+      </Note>
+    );
+  }
+  if (!asking) {
+    return (
+      <Button
+        variant="default"
+        h="auto"
+        mih={48}
+        py={8}
+        styles={{ label: { whiteSpace: "normal" } }}
+        leftSection={<IconShieldCheck size={20} aria-hidden />}
+        onClick={() => setAsking(true)}
+      >
+        Set best gains as safe gains
+      </Button>
+    );
+  }
+  return (
+    <form
+      className={classes["stack"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        promote.mutate({ version: vehicle.version, statement }, { onSuccess: () => setAsking(false) });
+      }}
+    >
+      <Note fz="body">
+        After every flight and abort, {vehicle.name} will be set to {gainsInBrackets(campaign.winner.gains)} instead of{" "}
+        {gainsInBrackets(vehicle.safe_gains)}.
+      </Note>
+      <TextInput
+        label="Decided by, and based on which flights"
+        value={statement}
+        maxLength={500}
+        error={reasonsByField(problemOf(promote.error), ["statement"])["statement"]}
+        onChange={(event) => setStatement(event.currentTarget.value)}
+      />
+      <Button type="submit" disabled={statement.trim() === ""} loading={promote.isPending}>
+        Save safe gains
+      </Button>
+      <Button variant="default" onClick={() => setAsking(false)}>
+        Cancel
+      </Button>
+      <ErrorNotice error={promote.error} shown={["statement"]} />
+    </form>
+  );
+}
