@@ -121,7 +121,8 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
 def _with_target(trial: Trial, event: PacketReceived) -> Trial:
     """Note that the vehicle follows another set point than it was commanded to."""
     set_points, finding = trial.set_points.update(event.measurement, event.now_s, trial.plan)
-    return note(replace(trial, set_points=set_points), finding)
+    trial = trial if set_points is trial.set_points else replace(trial, set_points=set_points)
+    return note(trial, finding)
 
 
 def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -> Trial:
