@@ -26,7 +26,8 @@ from app.vehicles.mavlink.monitors.clock import ATTENDED_S, ClockMonitor, LinkMo
 from app.vehicles.mavlink.monitors.ground import AGREED_S, STANDS_S, ClimbMonitor, GroundMonitor
 from app.vehicles.mavlink.monitors.limits import BatteryMonitor, EnvelopeMonitor
 from app.vehicles.mavlink.monitors.modes import IdentityMonitor, ModeMonitor
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace
 
 _DRIFT_M_S: Final = 0.5
 """Greatest rate of a drift of the altitude on the ground; 0.36 m/s were recorded under PX4."""

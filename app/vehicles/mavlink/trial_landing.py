@@ -13,7 +13,7 @@ from app.vehicles.mavlink.events import (
     confirms_motors_off,
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, DRIFT_M, REPEAT_S, Failure, land_every_s
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_reactions import (
     abort,
     abort_landing,

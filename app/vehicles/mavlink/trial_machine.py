@@ -23,7 +23,8 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DRIFT_M, REPEAT_S, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_phases import HANDLERS
 from app.vehicles.mavlink.trial_reactions import allowed_modes, fail, measure_ground, note, note_cause, stop_motors
 from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, State, Step, Trial

@@ -17,7 +17,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DRIFT_M, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
 from app.vehicles.mavlink.trial_reactions import (
     MODE_KNOWN_S,

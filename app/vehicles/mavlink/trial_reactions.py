@@ -12,7 +12,7 @@ from app.autopilots.measurements import Parameter
 from app.vehicles.flight_end import Landing, StopRequest, request_text
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GROUND_M, RESPONSES, Failure, Finding, Reaction
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import (
     STATES_WITH_TRIAL_GAINS,
     TRANSITIONS,

@@ -11,7 +11,8 @@ from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding
-from app.vehicles.mavlink.plan import Plan, replace, since
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace, since
 
 AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
