@@ -84,12 +84,15 @@ class AltitudeSource:
     def __init__(self, name: str) -> None:
         self.name: Final = name
         """Description for the operator: what it is and where it is received."""
+        # used by both threads, the one that puts and the flight's, which takes
         self._samples: deque[SourceSample] = deque(maxlen=KEPT)
+        self.newest: SourceSample | None = None
+        """The last sample put, taken or not."""
+        # used only by the thread that puts
         self._arrivals = ClockOffset()
         self._time_s = float("-inf")
         self._values: tuple[float, ...] = ()
-        self.newest: SourceSample | None = None
-        """The last sample put, taken or not."""
+        # used only by the flight's thread
         self.seen: list[tuple[float, float]] = []
         """The samples of the flight so far, as `SourceSample.measured_s` and altitude (m) on the vehicle's datum."""
         self._rise_m = 0.0

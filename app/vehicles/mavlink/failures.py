@@ -18,10 +18,10 @@ Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
 is unusable. quarantine: as invalid, and the vehicle's state is uncertain."""
 
 Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land", "repeat land", "cease", "note"]
-"""land, gains first: the gains are suspect, and the safe gains are sent before Land. A vehicle that lifts off late,
-with its integrator wound up, is treated in the same way. One that has not settled may ring, and would land for seconds
-on these gains, but may also drift, or be moved by its estimator or the wind: the flight is invalid, and does not count
-against the gains, unless it exceeds a limit."""
+"""none: there is nothing to undo. restore gains: write the safe gains. disarm: stop the motors, or abort if it may have
+left the ground. land, gains first: send the safe gains before Land, because those in flight are suspect. land: send
+Land at once. repeat land: send Land until the vehicle is received again. cease: send nothing more. note: send nothing
+for it alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         Failure.DUPLICATE: Response("land", "quarantine"),
         Failure.FALL: Response("note", "quarantine"),
         Failure.SET_POINT: Response("land", "invalid"),
+        # It may ring, and would land for seconds on these gains; but it may also drift, or be moved by its estimator or
+        # the wind: this does not count against the gains, unless it exceeds a limit.
         Failure.NOT_SETTLED: Response("land, gains first", "invalid"),
         Failure.PAUSED: Response("land", "invalid"),
     }

@@ -30,7 +30,7 @@ from app.autopilots.dialects import (
 )
 from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.reception import GONE_AFTER_S, DuplicateDetector, LinkHealth, LossCounter
+from app.vehicles.mavlink.reception import GONE_AFTER_S, DuplicateDetector, LinkHealth, LossCounter, OtherPeers
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
@@ -42,6 +42,8 @@ MAX_QUEUED_MESSAGES: Final = 20_000
 """Maximum number of messages that wait for `receive`; beyond it the oldest are dropped, and counted."""
 STEP_S: Final = 1.0 / 256.0
 """Step of the clock between two reads of a transport without a thread."""
+DUPLICATE_TIMEOUT_S: Final = 3.0
+"""Time for which messages of another peer with the vehicle's ids count."""
 
 _TOLD_ONCE: Final = frozenset({"PARAM_VALUE", "COMMAND_ACK", "MISSION_ACK", "SCRIPT_CURRENT"})
 """Messages of something that has happened: a copy of one that arrives later is out of date."""
@@ -99,6 +101,9 @@ class Link:
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
         self._duplicates = DuplicateDetector()
+        self._others = OtherPeers()
+        self._last_number = 0
+        self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
         self._plan: dict[float, bytes] = {}
@@ -120,6 +125,8 @@ class Link:
         """Evidence that two vehicles use the system id; empty without evidence."""
         now_s = self._clock.now_s()
         with self._inbox_changed:
+            if now_s - self._duplicate_s < DUPLICATE_TIMEOUT_S:
+                return "Another vehicle with the same system id sends from another address."
             return self._duplicates.reason(now_s)
 
     @property
@@ -276,12 +283,16 @@ class Link:
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
                 self._transport.adopt(peer)
-        elif not is_gone and self._health.last_packet_s is not None and self._duplicates.may_check(peer, now_s):
+        elif not is_gone and self._health.last_packet_s is not None and self._others.may_check(peer, now_s):
             message = next((each for each in self._new_codec().parse(data) if self._poses_as_vehicle(each)), None)
-            has_moved = message is not None and self._duplicates.add_other(
-                peer, sequence(message), now_s, last_s=self._health.last_packet_s
+            if message is None:
+                return
+            verdict = self._others.add(
+                peer, sequence(message), now_s, last_number=self._last_number, last_s=self._health.last_packet_s
             )
-            if has_moved and is_same_host:
+            if verdict == "duplicate":
+                self._duplicate_s = now_s
+            elif verdict == "moved" and is_same_host:
                 self._transport.adopt(peer)
 
     def _poses_as_vehicle(self, message: Message) -> bool:
@@ -338,6 +349,7 @@ class Link:
         if self._vehicle_component in (None, source_component(message)):
             self._health.last_packet_s = now_s
             counts = not message.get_type().startswith(self._dialect.uncounted)
+            self._last_number = sequence(message) if counts else self._last_number
             is_copy = self._duplicates.add(frame, sequence(message), now_s, _boot_s(message), is_counted=counts)
             if is_copy and message.get_type() in _TOLD_ONCE:
                 return False

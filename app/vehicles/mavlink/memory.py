@@ -23,7 +23,7 @@ from app.core.records.trajectory import THROTTLE_HOLDS_S
 from app.vehicles.mavlink.monitors.clock import (
     AHEAD_S,
     BACK_S,
-    DRIFT,
+    CLOCK_DRIFT,
     RESTARTED_S,
     OtherClock,
     may_have_begun,
@@ -77,18 +77,18 @@ class LoopReports:
                 self.target_m, self.target_s = altitude_m, now_s
 
 
-@dataclass(slots=True)
 class RestartCounter:
     """Counts the restarts of a vehicle on the ground by its positions.
 
     A clock that jumps ahead counts, too: while this computer slept, the vehicle may have restarted.
     """
 
-    restarts: int = 0
-    _last: Position | None = None
-    _last_s: float = 0.0
-    _heard: int = 0
-    _other: OtherClock | None = None
+    def __init__(self) -> None:
+        self.restarts = 0
+        self._last: Position | None = None
+        self._last_s = 0.0
+        self._heard = 0
+        self._other: OtherClock | None = None
 
     def take(self, position: Position, now_s: float) -> None:
         """Process a position received at `now_s` by our clock."""
@@ -103,7 +103,7 @@ class RestartCounter:
         """Whether the position is by the same clock. One that fell behind may be that of a simulation that stood still,
         unless it can have begun since the last position."""
         gained_s, passed_s = position.time_boot_s - last.time_boot_s, now_s - self._last_s
-        is_behind = gained_s < (1.0 - DRIFT) * passed_s - _BEHIND_S
+        is_behind = gained_s < (1.0 - CLOCK_DRIFT) * passed_s - _BEHIND_S
         return 0.0 < gained_s <= passed_s + AHEAD_S and not (
             is_behind and may_have_begun(position.time_boot_s, passed_s)
         )
@@ -145,8 +145,8 @@ class VehicleMemory:
     restart_counter: RestartCounter = field(default_factory=RestartCounter)
     status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=_STATUS_TEXTS))
     status_text_s: float | None = None
-    _piece_of: int = 0
-    _pieces: str = ""
+    _piece_of: int = field(init=False, default=0)
+    _pieces: str = field(init=False, default="")
 
     @property
     def restarts(self) -> int:

@@ -22,11 +22,13 @@ from app.autopilots.measurements import (
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Finding
 from app.vehicles.mavlink.monitors.altitude import PositionMonitor, SecondSourceMonitor
-from app.vehicles.mavlink.monitors.clock import ATTENDED_S, ClockMonitor, LinkMonitor, unwrapped
+from app.vehicles.mavlink.monitors.clock import ATTENDED_S, ClockMonitor, unwrapped
 from app.vehicles.mavlink.monitors.ground import AGREED_S, STANDS_S, ClimbMonitor, GroundMonitor
 from app.vehicles.mavlink.monitors.limits import BatteryMonitor, EnvelopeMonitor
+from app.vehicles.mavlink.monitors.link import LinkMonitor
 from app.vehicles.mavlink.monitors.modes import IdentityMonitor, ModeMonitor
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace
 
 _DRIFT_M_S: Final = 0.5
 """Greatest rate of a drift of the altitude on the ground; 0.36 m/s were recorded under PX4."""

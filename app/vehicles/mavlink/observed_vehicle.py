@@ -18,11 +18,12 @@ from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.identity import VehicleIdentity
 from app.vehicles.mavlink.monitors.clock import RESTARTED_S
 from app.vehicles.mavlink.preparation import ARMED
+from app.vehicles.mavlink.quarantine import Quarantine
 from app.vehicles.mavlink.radio import LISTEN_S, open_radio
 from app.vehicles.mavlink.sent_commands import STOPPING_S, RepeatedCommand, set_up
+from app.vehicles.mavlink.status_reader import StatusReader
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial_state import State
-from app.vehicles.mavlink.vehicle_status import Quarantine, StatusReader
 
 _POSITIONS_CEASED_S: Final = 2.0
 _NOT_STOPPED: Final = f"The vehicle has not confirmed within {STOPPING_S:g} s that its motors stopped."
@@ -55,11 +56,11 @@ class ObservedVehicle(ABC):
         A vehicle that `was_flying` in a trial when the process that flew it ended gets Land while it is flown as in a
         trial, and no heartbeats of a ground station until then.
 
-        `clock` is the vehicle's time; `source` is a second source of altitude, which is
-        closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
-        `trial_parameters` keeps the parameters that a trial changes in addition to the gains, so that the next
-        connection can restore them if this process dies. `on_wait` is called while waiting for the vehicle on the
-        ground; an exception from it ends the operation.
+        `clock` is the vehicle's time; `source` is a second source of altitude, which is closed with the vehicle;
+        `transport` replaces the address and the thread that reads it. The folder `trial_parameters` keeps the
+        parameters that a trial changes in addition to the gains, so that the next connection can restore them if this
+        process dies. `on_wait` is called while waiting for the vehicle on the ground; an exception from it ends the
+        operation.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains stays connected and is only observed
         (see `concern`). Otherwise it raises SafeGainsError, and a vehicle that is not ready to fly VehicleError. Raises

@@ -6,9 +6,10 @@ import json
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 from app.autopilots import commands
 from app.autopilots.autopilot import GainParameter, GainSet, check_gains
@@ -253,7 +254,8 @@ def written(gains: Gains) -> str:
 # ---- parameters of the takeoff
 
 
-class ChangedParameter(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class ChangedParameter:
     """Value of a parameter before and during a trial."""
 
     before: float
@@ -361,10 +363,11 @@ class TrialParameters:
         if not changed:
             file.unlink(missing_ok=True)
             return
+        parameters = {name: [one.before, one.during] for name, one in changed.items()}
         file.parent.mkdir(mode=0o700, exist_ok=True)
         fresh = file.with_suffix(".new")
         with fresh.open("w", encoding="utf-8") as writing:
-            json.dump({"vehicle": self._vehicle(), "parameters": changed}, writing)
+            json.dump({"vehicle": self._vehicle(), "parameters": parameters}, writing)
             writing.flush()
             os.fsync(writing.fileno())
         fresh.replace(file)

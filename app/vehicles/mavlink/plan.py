@@ -1,10 +1,8 @@
-"""Plan of a trial: the autopilot, the set points and gains of the flight, the ground under it, and its limits; and the
-successors of the frozen states that follow it.
-"""
+"""Plan of a trial: the autopilot, the set points and gains of the flight, the ground under it, and its limits."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 from app.autopilots.autopilot import Autopilot
 from app.autopilots.commands import Setting
@@ -13,38 +11,13 @@ from app.core.models.set_points import SetPoints
 from app.vehicles.base import RECORDED_BEYOND_S
 from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HELP
 
-if TYPE_CHECKING:
-    from dataclasses import replace
-else:
-
-    def replace(state, /, **changes):
-        """As `dataclasses.replace`, without the constructor, in a tenth of its time, because the states of a trial
-        change with every packet, some hundred times a second. For classes without slots and without `__post_init__`;
-        raises TypeError for a field that the class lacks."""
-        fields = state.__dict__
-        if not changes.keys() <= fields.keys():
-            raise TypeError(f"{type(state).__name__} has no {', '.join(changes.keys() - fields.keys())}")
-        successor = object.__new__(type(state))
-        object.__setattr__(successor, "__dict__", fields | changes)
-        return successor
-
-
-def since(before_s: float | None, now_s: float, *, holds: bool) -> float | None:
-    """Return since when something `holds` that has held since `before_s`; None if it does not hold."""
-    if not holds:
-        return None
-    return now_s if before_s is None else before_s
-
-
-__all__ = ["replace"]
-
 RECORD_S: Final = WINDOW_S + RECORDED_BEYOND_S
 """Length of the record for the default window."""
 _SLOW_S: Final = 3.0
 """Longest delay of the vehicle's clock behind ours at the end of such a record."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
     """Plan of a trial.
 

@@ -183,10 +183,9 @@ def open_radio(
 ) -> AutopilotLink:
     """Open the link to a vehicle.
 
-    `clock` is the vehicle's time; for `on_message` and `on_wait` see AutopilotLink;
-    no heartbeats are sent while `is_silent` returns true; `transport` replaces the address and the thread that reads
-    it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
-    used.
+    `clock` is the vehicle's time; for `on_message` and `on_wait` see AutopilotLink; no heartbeats are sent while
+    `is_silent` returns true; `transport` replaces the address and the thread that reads it. Raises LinkError if the
+    link or its log cannot be opened, InputError for a signing key that cannot be read or used.
     """
     profile = AUTOPILOTS[str(options["autopilot"])]
     key_file, log_folder = str(options["signing_key_file"]), str(options["log_folder"])

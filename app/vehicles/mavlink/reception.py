@@ -10,7 +10,7 @@ copies of its packets. A single packet of it says nothing, and a copy of one alr
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from app.vehicles.mavlink.transports import Peer
 
@@ -52,10 +52,12 @@ _MOST_PEERS: Final = 32
 _PEERS_PACKETS: Final = 3
 """Packets of another peer that are evidence of a second vehicle."""
 _PEERS_WITHIN_S: Final = 3.0
+"""A peer that has sent no such packet for this long is forgotten, and counted from one again."""
 _PEERS_LOST: Final = 64
 """The numbers of a vehicle's packets go on at another port if fewer than this are missing."""
-_PEERS_REMEMBERED_S: Final = 3.0
-"""Time for which such evidence counts."""
+
+Verdict = Literal["", "moved", "duplicate"]
+"""What a packet of another peer shows: nothing yet, that the vehicle has moved there, or that there is a second one."""
 
 
 @dataclass(slots=True)
@@ -99,12 +101,6 @@ class LossCounter:
 
 
 @dataclass(slots=True)
-class _Used:
-    at_s: float
-    count: int
-
-
-@dataclass(slots=True)
 class _Other:
     first_s: float
     last_s: float
@@ -112,9 +108,41 @@ class _Other:
     packets: int = 0
 
 
+class OtherPeers:
+    """Peers other than the vehicle's whose datagrams were parsed."""
+
+    def __init__(self) -> None:
+        self._checked_s: dict[Peer, float] = {}
+        self._others: dict[Peer, _Other] = {}
+
+    def may_check(self, peer: Peer, now_s: float) -> bool:
+        """Whether to parse a datagram of another peer now. Each has its own interval, so that one does not hide
+        another."""
+        recent_s = {each: at_s for each, at_s in self._checked_s.items() if now_s - at_s < INTERVAL_S}
+        if peer in recent_s or len(recent_s) >= _MOST_PEERS:
+            return False
+        self._checked_s = {**recent_s, peer: now_s}
+        return True
+
+    def add(self, peer: Peer, sequence: int, now_s: float, *, last_number: int, last_s: float) -> Verdict:
+        """Add a packet with the vehicle's ids that is no copy; `last_number` and `last_s` are of the vehicle's last."""
+        self._others = {each: other for each, other in self._others.items() if now_s - other.last_s < _PEERS_WITHIN_S}
+        other = self._others.setdefault(peer, _Other(now_s, now_s, sequence))
+        other.last_s, other.packets = now_s, other.packets + 1
+        if other.first_s > last_s:
+            goes_on = 0 < (other.number - last_number) % NUMBERS < _PEERS_LOST
+            return "moved" if goes_on and other.packets > 1 and now_s - last_s > MOVED_AFTER_S else ""
+        return "duplicate" if other.packets >= _PEERS_PACKETS else ""
+
+
+@dataclass(slots=True)
+class _Used:
+    at_s: float
+    count: int
+
+
 class DuplicateDetector:
-    """Detector for the messages of one component, in the order of receipt, and for those of other peers than the
-    vehicle's with its ids."""
+    """Detector for the messages of one component, in the order of receipt."""
 
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
@@ -131,15 +159,10 @@ class DuplicateDetector:
         self._clock_changes: deque[float] = deque()
         self._certain_s: float | None = None
         self._why = ""
-        self._last_number = 0
-        self._checked_s: dict[Peer, float] = {}
-        self._others: dict[Peer, _Other] = {}
-        self._other_s = float("-inf")
 
     def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None, *, is_counted: bool = True) -> bool:
         """Add a message by its whole frame and sequence number, which counts unless the message has another counter;
         `boot_s` is its time stamp, if it has one. Return whether it is a copy."""
-        self._last_number = number if is_counted else self._last_number
         while self._frames and now_s - self._frames[oldest := next(iter(self._frames))] > _REMEMBERED_FRAMES_S:
             del self._frames[oldest]
         is_copy = self._frames.pop(frame, None) is not None
@@ -150,36 +173,12 @@ class DuplicateDetector:
             self._add_clock(boot_s - now_s, now_s)
         return False
 
-    def may_check(self, peer: Peer, now_s: float) -> bool:
-        """Whether to parse a datagram of another peer now. Each has its own interval, so that one does not hide
-        another."""
-        recent_s = {each: at_s for each, at_s in self._checked_s.items() if now_s - at_s < INTERVAL_S}
-        if peer in recent_s or len(recent_s) >= _MOST_PEERS:
-            return False
-        self._checked_s = {**recent_s, peer: now_s}
-        return True
-
-    def add_other(self, peer: Peer, number: int, now_s: float, *, last_s: float) -> bool:
-        """Add a packet of another peer with the vehicle's ids that is no copy; `last_s` is the time of the vehicle's
-        last. Return whether the vehicle has moved there."""
-        self._others = {each: other for each, other in self._others.items() if now_s - other.last_s < _PEERS_WITHIN_S}
-        other = self._others.setdefault(peer, _Other(now_s, now_s, number))
-        other.last_s, other.packets = now_s, other.packets + 1
-        if other.first_s > last_s:
-            goes_on = 0 < (other.number - self._last_number) % NUMBERS < _PEERS_LOST
-            return goes_on and other.packets > 1 and now_s - last_s > MOVED_AFTER_S
-        if other.packets >= _PEERS_PACKETS:
-            self._other_s = now_s
-        return False
-
     def has_seen(self, frame: bytes) -> bool:
         """Whether a message is a copy of a recent one."""
         return frame in self._frames
 
     def reason(self, now_s: float) -> str:
         """Return the evidence for two vehicles; empty without evidence."""
-        if now_s - self._other_s < _PEERS_REMEMBERED_S:
-            return "Another vehicle with the same system id sends from another address."
         if self._is_certain(self._repeated_numbers, now_s):
             self._certain_s, self._why = now_s, "Its sequence numbers are repeated with different contents."
         elif self._is_certain(self._clock_changes, now_s):

@@ -18,7 +18,8 @@ from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink.events import ActionDone, PerformAction
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.monitors.commanded import SetPointChange
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import Step, Trial
 
 HELD_BEFORE_S: Final = 6.0

@@ -81,37 +81,7 @@ def open_transport(address: Address) -> Transport:
             return StreamTransport((device, baud), lambda: _serial_port(device, baud))
 
 
-class _Waking:
-    """What waits for a descriptor, or for `wake` from another thread."""
-
-    def __init__(self) -> None:
-        self._wake_receiver, self._wake_sender = socket.socketpair()
-        self._wake_receiver.setblocking(False)
-        self._wake_sender.setblocking(False)
-
-    def _wait(self, timeout_s: float, descriptor: int | None = None, *, writes: bool = False) -> tuple[bool, bool]:
-        """Return whether the descriptor is readable, and with `writes` writable; neither after a timeout or wake."""
-        polled = select.poll()
-        polled.register(self._wake_receiver, select.POLLIN)
-        if descriptor is not None:
-            polled.register(descriptor, select.POLLIN | (select.POLLOUT if writes else 0))
-        found = dict(polled.poll(max(timeout_s, 0.0) * 1000.0))
-        if self._wake_receiver.fileno() in found:
-            with contextlib.suppress(BlockingIOError):
-                self._wake_receiver.recv(LARGEST_READ)
-        events = 0 if descriptor is None else found.get(descriptor, 0)
-        return bool(events & ~select.POLLOUT), bool(events & ~select.POLLIN)
-
-    def wake(self) -> None:
-        with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
-            self._wake_sender.send(b"!")
-
-    def close(self) -> None:
-        self._wake_receiver.close()
-        self._wake_sender.close()
-
-
-class UdpTransport(_Waking):
+class UdpTransport:
     """Datagrams between our address and one peer's."""
 
     def __init__(self, local: Peer, remote: Peer | None) -> None:
@@ -125,12 +95,12 @@ class UdpTransport(_Waking):
         except OSError as error:
             self._socket.close()
             raise _cannot_open(f"udp port {local[1]} of {local[0]}", error) from error
-        super().__init__()
+        self._waiter = _Waiter()
         self.remote = remote
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         datagrams: list[tuple[bytes, Peer]] = []
-        is_readable, _ = self._wait(timeout_s, self._socket.fileno())
+        is_readable, _ = self._waiter.wait(timeout_s, self._socket.fileno())
         if is_readable:
             with contextlib.suppress(BlockingIOError):
                 while len(datagrams) < BATCH:
@@ -149,8 +119,11 @@ class UdpTransport(_Waking):
     def adopt(self, peer: Peer) -> None:
         self.remote = peer
 
+    def wake(self) -> None:
+        self._waiter.wake()
+
     def close(self) -> None:
-        super().close()
+        self._waiter.close()
         self._socket.close()
 
 
@@ -158,7 +131,7 @@ _Stream = socket.socket | serial.Serial
 """An open, non-blocking descriptor."""
 
 
-class StreamTransport(_Waking):
+class StreamTransport:
     """Stream of bytes to and from one peer; after it has broken, opening is retried every second."""
 
     def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
@@ -169,7 +142,7 @@ class StreamTransport(_Waking):
             self._stream: _Stream | None = opened()
         except OSError as error:
             raise _cannot_open(f"{peer[0]}:{peer[1]}", error) from error
-        super().__init__()
+        self._waiter = _Waiter()
         self._next_try_s = 0.0
         # Other threads use only the stream's descriptor, under this lock; the reader closes a broken stream.
         self._writing = threading.Lock()
@@ -180,10 +153,10 @@ class StreamTransport(_Waking):
         if self._is_broken:
             self._break()
         if self._stream is None:
-            self._wait(min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0)))
+            self._waiter.wait(min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0)))
             self._reopen()
             return []
-        is_readable, is_writable = self._wait(timeout_s, self._stream.fileno(), writes=bool(self._backlog))
+        is_readable, is_writable = self._waiter.wait(timeout_s, self._stream.fileno(), writes=bool(self._backlog))
         if is_writable:
             with self._writing:
                 self._flush(self._stream)
@@ -197,16 +170,19 @@ class StreamTransport(_Waking):
             self._backlog += data
             self._flush(self._stream)
             if self._backlog or self._is_broken:
-                self.wake()
+                self._waiter.wake()
             return not self._is_broken
 
     def adopt(self, peer: Peer) -> None:
         """Do nothing: there is only one peer."""
 
+    def wake(self) -> None:
+        self._waiter.wake()
+
     def close(self) -> None:
         if self._stream is not None:
             self._stream.close()
-        super().close()
+        self._waiter.close()
 
     def _receive(self, stream: _Stream) -> bytes:
         """Read a readable stream; if it contains nothing, it has ended."""
@@ -245,6 +221,36 @@ class StreamTransport(_Waking):
             self._stream = self._opened()
         except OSError:
             self._next_try_s = time.monotonic() + REOPEN_EVERY_S
+
+
+class _Waiter:
+    """Waits for a descriptor, or for `wake` from another thread."""
+
+    def __init__(self) -> None:
+        self._wake_receiver, self._wake_sender = socket.socketpair()
+        self._wake_receiver.setblocking(False)
+        self._wake_sender.setblocking(False)
+
+    def wait(self, timeout_s: float, descriptor: int | None = None, *, writes: bool = False) -> tuple[bool, bool]:
+        """Return whether the descriptor is readable, and with `writes` writable; neither after a timeout or wake."""
+        polled = select.poll()
+        polled.register(self._wake_receiver, select.POLLIN)
+        if descriptor is not None:
+            polled.register(descriptor, select.POLLIN | (select.POLLOUT if writes else 0))
+        found = dict(polled.poll(max(timeout_s, 0.0) * 1000.0))
+        if self._wake_receiver.fileno() in found:
+            with contextlib.suppress(BlockingIOError):
+                self._wake_receiver.recv(LARGEST_READ)
+        events = 0 if descriptor is None else found.get(descriptor, 0)
+        return bool(events & ~select.POLLOUT), bool(events & ~select.POLLIN)
+
+    def wake(self) -> None:
+        with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
+            self._wake_sender.send(b"!")
+
+    def close(self) -> None:
+        self._wake_receiver.close()
+        self._wake_sender.close()
 
 
 def _connected(host: str, port: int) -> socket.socket:

@@ -13,9 +13,10 @@ from app.vehicles.mavlink.events import (
     confirms_motors_off,
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, DRIFT_M, REPEAT_S, Failure, land_every_s
-from app.vehicles.mavlink.plan import replace, since
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_reactions import (
     abort,
+    abort_landing,
     disarm,
     enter,
     fail,
@@ -24,7 +25,6 @@ from app.vehicles.mavlink.trial_reactions import (
     find_doubt_of_descent,
     find_doubt_of_ground,
     find_taken_over,
-    land,
     may_be_by_hand,
     note,
     quarantine,
@@ -93,7 +93,9 @@ def resting(trial: Trial, now_s: float) -> Trial:
         rests = trial.watch.ground.grounded_since_s is not None
     else:
         rests = trial.watch.positions.is_still(now_s, trial.plan.ground_m)
-    return replace(trial, resting_since_s=since(trial.resting_since_s, now_s, holds=rests))
+    if rests is (trial.resting_since_s is not None):
+        return trial
+    return replace(trial, resting_since_s=now_s if rests else None)
 
 
 def has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
@@ -115,7 +117,7 @@ def link_lost(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     is_received = isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat)
     if is_received and not may_be_by_hand(trial, now_s):
-        return land(trial, now_s)
+        return abort_landing(trial, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
         return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
     return _land_again(trial, now_s)

@@ -23,7 +23,8 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DRIFT_M, REPEAT_S, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.plan import Plan, replace
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_phases import HANDLERS
 from app.vehicles.mavlink.trial_reactions import allowed_modes, fail, measure_ground, note, note_cause, stop_motors
 from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, State, Step, Trial
@@ -121,7 +122,8 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
 def _with_target(trial: Trial, event: PacketReceived) -> Trial:
     """Note that the vehicle follows another set point than it was commanded to."""
     set_points, finding = trial.set_points.update(event.measurement, event.now_s, trial.plan)
-    return note(replace(trial, set_points=set_points), finding)
+    trial = trial if set_points is trial.set_points else replace(trial, set_points=set_points)
+    return note(trial, finding)
 
 
 def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -> Trial:

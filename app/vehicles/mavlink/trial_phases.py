@@ -17,10 +17,11 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DRIFT_M, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
 from app.vehicles.mavlink.trial_reactions import (
     MODE_KNOWN_S,
+    abort_landing,
     enter,
     fail,
     find_in_flight,
@@ -154,7 +155,7 @@ def _record(trial: Trial, event: Event) -> Step:
         watch.climb.find_incomplete(plan.climb_to_m) if plan.autopilot.climbs_from_ground else None,
     ):
         trial = note(trial, finding)
-    return land(trial, now_s, State.LAND)
+    return land(trial, State.LAND, now_s)
 
 
 def _may_have_stayed(trial: Trial, now_s: float) -> bool:
@@ -175,7 +176,7 @@ def _withdraw(trial: Trial, now_s: float) -> Step:
     if is_by_hand(trial):
         return trial, ()
     why = "A heartbeat reported a manual mode, so that no further set point was commanded."
-    return land(note(trial, Finding(Failure.INTERRUPTED, why)), now_s)
+    return abort_landing(note(trial, Finding(Failure.INTERRUPTED, why)), now_s)
 
 
 def _change_set_point(trial: Trial, event: Event) -> Step | None:
@@ -192,7 +193,7 @@ def _change_set_point(trial: Trial, event: Event) -> Step | None:
     if not set_point_schedule.is_due(trial, now_s) or may_be_by_hand(trial, now_s):
         return (trial, ()) if is_confirmed else None
     if trial.failure is not None:
-        return land(trial, now_s)
+        return abort_landing(trial, now_s)
     finding = set_point_schedule.find_unsettled(trial)
     return set_point_schedule.command_next(trial) if finding is None else fail(trial, finding, now_s)
 

@@ -4,7 +4,6 @@ with their commands, as pure functions of a trial and the time. `trial_phases` d
 
 import statistics
 from collections.abc import Callable, Mapping
-from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -13,7 +12,7 @@ from app.autopilots.measurements import Parameter
 from app.vehicles.flight_end import Landing, StopRequest, request_text
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GROUND_M, RESPONSES, Failure, Finding, Reaction
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import (
     STATES_WITH_TRIAL_GAINS,
     TRANSITIONS,
@@ -158,7 +157,7 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     trial = note(trial, finding)
     reaction = RESPONSES[finding.failure].reaction
     if trial.state is State.ARM:
-        return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else land(trial, now_s)
+        return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else abort_landing(trial, now_s)
     if reaction == "cease":
         return quarantine(trial, finding.why, now_s)
     if trial.state in (State.ABORT_LAND, State.LINK_LOST):
@@ -211,7 +210,12 @@ def abort_with_safe_gains(trial: Trial, now_s: float) -> Step:
     return replace(trial, safe_gains=sent), (SendGain(first),)
 
 
-def land(trial: Trial, now_s: float, state: State = State.ABORT_LAND) -> Step:
+def abort_landing(trial: Trial, now_s: float) -> Step:
+    """Abort by Land alone, with the gains as they are."""
+    return land(trial, State.ABORT_LAND, now_s)
+
+
+def land(trial: Trial, state: State, now_s: float) -> Step:
     """Command Land and enter `state`, which repeats it."""
     return replace(enter(trial, state, now_s), repeated_s=now_s), (PerformAction(Action.LAND),)
 
@@ -323,8 +327,8 @@ def send_gains(trial: Trial, sent: SafeGainsSent, event: Event) -> Step:
 
 _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
     "land, gains first": abort,
-    "land": land,
-    "repeat land": partial(land, state=State.LINK_LOST),
+    "land": abort_landing,
+    "repeat land": lambda trial, now_s: land(trial, State.LINK_LOST, now_s),
     "disarm": _give_up_take_off,
 }
 """Transition for each reaction of `RESPONSES`, for a vehicle that has been commanded to take off."""

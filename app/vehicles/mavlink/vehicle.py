@@ -187,18 +187,18 @@ class MavlinkVehicle(VehicleConnection):
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         radio = self._radio
         further = radio.profile.set_point_requirements if _flies_steps(order) else ()
-        needed = [preflight.evaluate_requirement(radio, requirement) for requirement in further]
+        requirements = [preflight.evaluate_requirement(radio, requirement) for requirement in further]
         watched, items = self._check(STANDSTILL_S)
         try:
             limits = radio.profile.hover_limits(self._loop)
         except AutopilotError as error:
             raise VehicleError(error.message, hint=error.hint) from error
-        needed += preflight.evaluate_hover(self._hover_throttle, limits)
-        if radio.profile.flying_blocks:
-            plan_time_s = float(self._options["plan_time_s"])
-            needed.insert(0, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
+        hover = preflight.evaluate_hover(self._hover_throttle, limits)
+        plan_time_s = float(self._options["plan_time_s"])
+        flight_time = preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s)
+        time = (flight_time,) if radio.profile.flying_blocks else ()
         self._quarantine.require_none()
-        preflight.require((*items, *needed, preflight.evaluate_set_points(order.set_points)))
+        preflight.require((*items, *time, *requirements, *hover, preflight.evaluate_set_points(order.set_points)))
         return watched
 
     def _fly(

@@ -2,7 +2,7 @@ from typing import Any
 
 import pytest
 
-from app.vehicles.mavlink.plan import replace
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import COMMANDED, OVER, TRANSITIONS, State
 from tests.vehicles.mavlink.walking import TrialDriver
 

@@ -11,8 +11,10 @@ from typing import Final
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Failure, Finding
-from app.vehicles.mavlink.monitors.clock import ATTENDED_S, FRESH_S, LOST_S, SILENT_S, STUCK_S
-from app.vehicles.mavlink.plan import Plan, replace, since
+from app.vehicles.mavlink.monitors.clock import ATTENDED_S, FRESH_S, LOST_S, STUCK_S
+from app.vehicles.mavlink.monitors.link import SILENT_S
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace, since
 
 RESTING_M_S: Final = 0.1
 _JUMP_M: Final = 0.3

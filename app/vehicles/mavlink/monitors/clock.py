@@ -1,5 +1,4 @@
-"""The link and the vehicle's clock, its time since boot: whether packets arrive, whether the clock advances, steps or
-restarts, and how late its positions arrive.
+"""The vehicle's clock, its time since boot: whether it advances, steps or restarts, and how late its positions arrive.
 
 Packets may be late, repeated, in any order, or corrupted: a single one by another clock says nothing. Another clock
 that goes on by itself is the sign of a restart.
@@ -10,8 +9,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots.measurements import Position
-from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding
-from app.vehicles.mavlink.plan import Plan, replace, since
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace, since
 
 AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
@@ -25,11 +25,10 @@ RESTARTED_S: Final = 0.4
 """Time for which another clock goes on alone before it is the vehicle's."""
 WRAP_S: Final = 2.0**32 / 1000.0
 """After this time, 49.7 days, `time_boot_ms` begins at 0 again."""
-DRIFT: Final = 0.1
+CLOCK_DRIFT: Final = 0.1
 """Share by which the vehicle's clock may be slower than ours."""
 _SAME_CLOCK_S: Final = 0.5
 _NEAR_WRAP_S: Final = 60.0
-SILENT_S: Final = 1.0
 FRESH_S: Final = 0.5
 """Greatest age of a sample, since it was sent, that counts as the current position."""
 ATTENDED_S: Final = 0.1
@@ -41,22 +40,6 @@ _LONGEST_STEP_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LinkMonitor:
-    """`received_s` is the time of the last packet."""
-
-    received_s: float
-
-    def find(self, plan: Plan, heartbeat_s: float, now_s: float) -> Finding | None:
-        """Find a lost link; `heartbeat_s` is the time of the last heartbeat."""
-        silent_s = SILENT_S * plan.timeout_factor
-        if now_s - self.received_s > silent_s:
-            return Finding(Failure.LINK, f"Nothing was received for more than {silent_s:g} s.")
-        if now_s - heartbeat_s > HEARTBEATS_MISSED * plan.heartbeat_s:
-            return Finding(Failure.LINK, "Three heartbeats were missed.")
-        return None
-
-
 def unwrapped(position: Position, newest: Position | None) -> Position:
     """Return the position with a time that continues that of the newest one beyond WRAP_S."""
     near_wrap = newest is not None and newest.time_boot_s > WRAP_S - _NEAR_WRAP_S
@@ -66,7 +49,7 @@ def unwrapped(position: Position, newest: Position | None) -> Position:
 
 def may_have_begun(time_boot_s: float, passed_s: float) -> bool:
     """Whether a clock with this time can have begun in the `passed_s` since the vehicle was last heard."""
-    return time_boot_s <= (1.0 + DRIFT) * passed_s + AHEAD_S
+    return time_boot_s <= (1.0 + CLOCK_DRIFT) * passed_s + AHEAD_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +94,7 @@ class ClockMonitor:
         """Note a position that continues the clock: the least latency, and since when positions are late."""
         offset_s = least_s = now_s - position.time_boot_s
         if self.least_offset_s is not None:
-            least_s = min(offset_s, self.least_offset_s + DRIFT * (now_s - self.advanced_s))
+            least_s = min(offset_s, self.least_offset_s + CLOCK_DRIFT * (now_s - self.advanced_s))
         late_since_s = since(self.late_since_s, now_s, holds=offset_s - least_s >= FRESH_S)
         return replace(self, advanced_s=now_s, stuck_s=0.0, least_offset_s=least_s, late_since_s=late_since_s)
 

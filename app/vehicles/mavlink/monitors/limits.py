@@ -7,7 +7,8 @@ from typing import Final
 from app.autopilots.measurements import Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.plan import Plan, replace, since
+from app.vehicles.mavlink.plan import Plan
+from app.vehicles.mavlink.states import replace, since
 
 _CLIMB_RATE_M_S: Final = 4.0
 _CROSSING_M: Final = 0.3
