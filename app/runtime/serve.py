@@ -26,7 +26,8 @@ from app.common.errors import AddressError, AlreadyRunningError, Problem
 from app.common.logging import configure_logs, say
 from app.common.settings import Settings
 from app.db.revision import is_current
-from app.processes import LockedError, exclusive, start_loading
+from app.processes import start_loading
+from app.processes.locks import LockedError, exclusive
 from app.web.addresses import exposure, web_address
 
 FIRST_PAUSE_S: Final = 0.2

@@ -41,8 +41,9 @@ from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
-from app.processes import LockedError, exclusive, when_parent_ends
+from app.processes import when_parent_ends
 from app.processes.calls import ComputePool
+from app.processes.locks import LockedError, exclusive
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
 from app.vehicles.flight_end import Requester, StopRequest

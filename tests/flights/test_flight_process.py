@@ -17,7 +17,7 @@ from app.flights.flight_loop import FlightMonitor, run_simulations
 from app.flights.flight_process import FlightProcess
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import MAX_LINE_BYTES, FlightPhase, PublishedMessage, Telemetry, encode
-from app.processes import exclusive
+from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
