@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Final, Literal
 
 from app.autopilots import commands, mavlink
 from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
@@ -68,9 +68,10 @@ class GainParameter:
 GainSet = tuple[GainParameter, ...]
 
 
-def on_board(
-    gains: Sequence[Gain], *, integrating: str, names: Mapping[str, tuple[str, float]] = MappingProxyType({})
-) -> GainSet:
+_SAME: Final[Mapping[str, tuple[str, float]]] = MappingProxyType({})
+
+
+def on_board(gains: Sequence[Gain], *, integrating: str, names: Mapping[str, tuple[str, float]] = _SAME) -> GainSet:
     """Return the gains of an experiment, with its ranges, as parameters of a release. `names`: those that have another
     name on board, and the factor to their value there. `integrating`: the one that clears an integrator."""
     return tuple(

@@ -18,7 +18,7 @@ from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Param
 from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, Part, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.loop import LoggedFlight
-from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, Steps
+from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, FlownSteps
 from app.core.analysis.segment import LEAD_S
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
@@ -150,10 +150,10 @@ class _Reader:
             loop = replace(ardupilot_loop(given), has_newer_names=self._has_newer_names)
             return read_ardupilot(loop, trajectory, self._steps(trajectory))
         hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
-        whole = Steps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
+        whole = FlownSteps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
         return read_px4(replace(px4_loop(given), vehicle=self.recording.system), trajectory, whole)
 
-    def _steps(self, trajectory: Trajectory) -> Steps:
+    def _steps(self, trajectory: Trajectory) -> FlownSteps:
         """The steps from the first one before which the vehicle was at rest, to some time after the last; a step right
         before the end is left out."""
         time_s, target_m = trajectory.time_s, trajectory["set_point_m"]
@@ -170,7 +170,7 @@ class _Reader:
                 Problem(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
             )
         end_s = time_s[found[len(rows)]] if len(found) > len(rows) else time_s[-1]
-        return Steps(
+        return FlownSteps(
             set_points=SetPoints(
                 times_s=(0.0, *map(on_step, times_s.tolist())),
                 altitudes_m=(float(target_m[rows[0] - 1]), *target_m[rows].tolist()),

@@ -81,7 +81,8 @@ def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
         kept, end = _kept(log, time_s, begin, held, stood, down)
         if kept.stop - kept.start >= MIN_SAMPLES:
             ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
-            found.append(_takeoff(log, len(found) + 1, time_s, channels, kept, begin, end, ground_m, held))
+            record = _Record(log, begin, end, ground_m, held)
+            found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
         free_from_s = float(time_s[down])
         if len(found) > MAX_TAKEOFFS:
             raise TrajectoryError(
@@ -266,50 +267,45 @@ class _GainsAt:
         ]
 
 
-def _takeoff(
-    log: Recording,
-    number: int,
-    time_s: Samples,
-    channels: Mapping[str, Samples],
-    kept: slice,
-    begin: Event,
-    end: Event,
-    ground_m: float,
-    held: _GainsAt,
-) -> Takeoff:
-    """The takeoff with this part of the samples as its record."""
-    shift_m = ground_m if log.autopilot.climbs_from_ground else 0.0
-    cut = {name: values[kept] - (shift_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
-    complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
-    left_out = [name for name in cut if name not in complete]
-    notes = (*log.notes, *log.remarks, *_notes(log, begin, end, ground_m, held, left_out))
-    return Takeoff(
-        number=number,
-        start_s=begin.time_s - float(time_s[0]),
-        begins_with=begin.what,
-        trajectory=Trajectory(
-            time_s[kept] - begin.time_s,
-            complete,
-            source="; ".join((log.title, f"time from {begin.what}", *notes)),
-            clock=log.clock,
-        ),
-        gains=held.gains,
-        gain_names=tuple(gain.gain for gain in log.autopilot.gain_sets[0]),
-        notes=notes,
-        is_commanded=begin.kind is EventKind.TAKEOFF,
-    )
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """Data from which one takeoff is assembled."""
 
+    log: Recording
+    begin: Event
+    end: Event
+    ground_m: float
+    held: _GainsAt
 
-def _notes(
-    log: Recording, begin: Event, end: Event, ground_m: float, held: _GainsAt, left_out: Sequence[str]
-) -> Iterator[str]:
-    if begin.kind is not EventKind.TAKEOFF:
-        yield NOT_COMMANDED
-    if log.autopilot.climbs_from_ground:
-        yield f"altitude relative to the ground, which is at {ground_m:.2f} m in the log"
-    if held.learned_late:
-        yield f"known only after the takeoff: {', '.join(held.learned_late)}"
-    if left_out:
-        yield f"left out because of missing values: {', '.join(left_out)}"
-    if end.what:
-        yield f"ends after {end.time_s - begin.time_s:.1f} s with {end.what}"
+    def takeoff(self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: slice) -> Takeoff:
+        ground_m = self.ground_m if self.log.autopilot.climbs_from_ground else 0.0
+        cut = {name: values[kept] - (ground_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
+        complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
+        notes = (*self.log.notes, *self.log.remarks, *self._notes([name for name in cut if name not in complete]))
+        return Takeoff(
+            number=number,
+            start_s=self.begin.time_s - float(time_s[0]),
+            begins_with=self.begin.what,
+            trajectory=Trajectory(
+                time_s[kept] - self.begin.time_s,
+                complete,
+                source="; ".join((self.log.title, f"time from {self.begin.what}", *notes)),
+                clock=self.log.clock,
+            ),
+            gains=self.held.gains,
+            gain_names=tuple(gain.gain for gain in self.log.autopilot.gain_sets[0]),
+            notes=notes,
+            is_commanded=self.begin.kind is EventKind.TAKEOFF,
+        )
+
+    def _notes(self, left_out: Sequence[str]) -> Iterator[str]:
+        if self.begin.kind is not EventKind.TAKEOFF:
+            yield NOT_COMMANDED
+        if self.log.autopilot.climbs_from_ground:
+            yield f"altitude relative to the ground, which is at {self.ground_m:.2f} m in the log"
+        if self.held.learned_late:
+            yield f"known only after the takeoff: {', '.join(self.held.learned_late)}"
+        if left_out:
+            yield f"left out because of missing values: {', '.join(left_out)}"
+        if self.end.what:
+            yield f"ends after {self.end.time_s - self.begin.time_s:.1f} s with {self.end.what}"

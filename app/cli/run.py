@@ -223,7 +223,7 @@ class _Campaign:
                 self._display.hold(request.safe_gains)
 
 
-class _Display(Progress):
+class _Display:
     """Progress line of the running flight, on standard error; finished flights are printed above it.
 
     `kinds` are those of the flights' proposals, which can be `none`: the strategy proposed no further step.
@@ -231,7 +231,7 @@ class _Display(Progress):
     """
 
     def __init__(self, definition: Definition, experiment: Experiment) -> None:
-        super().__init__(
+        self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
             BarColumn(),
@@ -239,7 +239,7 @@ class _Display(Progress):
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
+        self._task = self._progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
         self._output, self._output_unit = experiment.output, CHANNEL_UNITS[experiment.output]
@@ -248,11 +248,18 @@ class _Display(Progress):
         self.touched = False
         self.held: Mapping[str, float] | None = None
 
+    def __enter__(self) -> "_Display":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
     def hold(self, gains: Mapping[str, float] | None) -> None:
         self.touched, self.held = True, gains
 
     def planned(self, number: int, gains: Gains) -> None:
-        self.update(
+        self._progress.update(
             self._task,
             completed=0.0,
             note="",
@@ -260,17 +267,19 @@ class _Display(Progress):
         )
 
     def sampled(self, sample: Sample) -> None:
-        self.update(self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}")
+        self._progress.update(
+            self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}"
+        )
 
     def landed(self, trial: TrialRow, kind: str) -> None:
         self.trials.append(trial)
         self.kinds.append(kind)
-        self.console.print(
+        self._progress.console.print(
             f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
             f"({trial.state}{f': {reason}' if (reason := reason_of(trial)) else ''})",
             highlight=False,
         )
-        self.update(self._task, description="computing the next gains", completed=0.0, note="")
+        self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
 
 
 def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _Display, stopped_because: str) -> None:

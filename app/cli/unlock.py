@@ -10,7 +10,7 @@ from app.accounts.keys_and_links import LINK_VALID_S, Keyring
 from app.accounts.permissions import Key
 from app.common.errors import UnavailableError
 from app.common.settings import Settings
-from app.processes import signature
+from app.processes.locks import signature
 from app.web.addresses import unlock_link
 
 _ANSWERS_WITHIN_S = 5.0

@@ -36,7 +36,9 @@ def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> 
     held = revision_of(database_file)
     if held == REVISION:
         return
-    known = _known_revisions(database_file, held)
+    known = _known_revisions()
+    if held is not None and held not in known:
+        raise _newer(database_file, held)
     from alembic import command
 
     number, total = count(1), sum(each > (held or "") for each in known)
@@ -67,7 +69,8 @@ def require_current(database_file: Path) -> None:
     held = revision_of(database_file)
     if held == REVISION:
         return
-    _known_revisions(database_file, held)
+    if held is not None and held not in _known_revisions():
+        raise _newer(database_file, held)
     raise SchemaError(
         f"The database {database_file} is at revision {held or 'none'}, not {REVISION}.",
         hint="Run `gainline serve` to migrate it, or `alembic upgrade head` in a checkout.",
@@ -80,18 +83,11 @@ def revision_of(database_file: Path) -> str | None:
         return read_revision(database_file)
 
 
-def _known_revisions(database_file: Path, held: str | None) -> dict[str, str]:
-    """What each migration brings, by revision. Raises SchemaError when the revision that the database has is none of
-    them."""
+def _known_revisions() -> dict[str, str]:
+    """What each migration brings, by revision."""
     from alembic.script import ScriptDirectory
 
-    known = {script.revision: script.doc for script in ScriptDirectory.from_config(_config()).walk_revisions()}
-    if held is not None and held not in known:
-        raise SchemaError(
-            f"The database {database_file} was written by a newer Gainline (revision {held}).",
-            hint="Start that version, or choose another data folder with --data-dir.",
-        )
-    return known
+    return {script.revision: script.doc for script in ScriptDirectory.from_config(_config()).walk_revisions()}
 
 
 def _config() -> "Config":
@@ -103,3 +99,10 @@ def _config() -> "Config":
     config.set_main_option("script_location", str(packaged if packaged.is_dir() else _APP.parent / "migrations"))
     config.set_main_option("path_separator", "os")
     return config
+
+
+def _newer(database_file: Path, revision: str) -> SchemaError:
+    return SchemaError(
+        f"The database {database_file} was written by a newer Gainline (revision {revision}).",
+        hint="Start that version, or choose another data folder with --data-dir.",
+    )

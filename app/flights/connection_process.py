@@ -147,11 +147,8 @@ class VehicleProcess(FlightLoop):
         return connect(it.options, it.safe_gains, folder, it.identity, self._while_waiting, it.was_flying)
 
     def _next(self) -> ToVehicleProcess:
-        """Return the worker's next message that is not a command, which is forwarded at once; attend to the vehicle
-        meanwhile."""
-        while (message := self._line.receive()) is None or isinstance(message, VehicleCommand):
-            if message is not None:
-                self._forward_command(message)
+        """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
+        while (message := self._poll_commands()) is None:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             if (status := self._publish_status()) is not None and self._staging in {"staged", "silent"}:
                 self._watch_staged(status)
@@ -183,6 +180,14 @@ class VehicleProcess(FlightLoop):
             except VehicleError as error:
                 self._staging = "lost"
                 self._line.send(StagingLost(str(error)))
+
+    def _poll_commands(self) -> ToVehicleProcess | None:
+        """Forward a command at once; return any other message."""
+        message = self._line.receive()
+        if not isinstance(message, VehicleCommand):
+            return message
+        self._forward_command(message)
+        return None
 
     def _while_waiting(self) -> None:
         """Callback of slow operations on the ground: forwards a command at once, which interrupts the operation.

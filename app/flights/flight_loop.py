@@ -34,7 +34,8 @@ from app.flights.process_messages import (
     VehicleCommand,
 )
 from app.live.messages import FlightPhase, Telemetry
-from app.processes import LockedError, exclusive, ignore_stop_signals
+from app.processes import ignore_stop_signals
+from app.processes.locks import LockedError, exclusive
 from app.vehicles.base import (
     FlightRecord,
     SafeGainsError,

@@ -199,18 +199,27 @@ class TrialReadiness(Schema):
     is_ready: Annotated[bool, Field(description="whether the takeoff of the staged vehicle may be requested")]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Readiness:
+    """Steps that hold, steps that were reached and are lost, each in order, and why."""
+
+    steps: Steps
+    lost: Steps
+    losses: tuple[Loss, ...]
+
+
 def readiness_of(standing: Standing, report: VehicleReport) -> TrialReadiness:
     """Evaluate how far a flight has come and which of it still holds, for who asks: control is no step of theirs while
     another operator has it."""
-    steps, lost, losses = _steps_of(standing, report)
+    found = _readiness_of(standing, report)
+    steps, lost = found.steps, found.lost
     if standing.is_controlled_by_other:
         steps, lost = (tuple(step for step in each if step != "control") for each in (steps, lost))
-    is_ready = steps[-1:] == ("staged",) and not losses
-    return TrialReadiness(steps=steps, lost=lost, losses=losses, is_ready=is_ready)
+    is_ready = steps[-1:] == ("staged",) and not found.losses
+    return TrialReadiness(steps=steps, lost=lost, losses=found.losses, is_ready=is_ready)
 
 
-def _steps_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Steps, tuple[Loss, ...]]:
-    """Steps that hold, steps that were reached and are lost, each in order, and why."""
+def _readiness_of(standing: Standing, report: VehicleReport) -> _Readiness:
     reached = _REACHED[standing.trial]
     if standing.trial is TrialState.STAGED and standing.standing_down:
         reached = "control"
@@ -220,27 +229,23 @@ def _steps_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Steps, 
         reached = "landed"
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
     if standing.trial is TrialState.LOST or standing.was_lost_in_flight:  # whether it has landed is not known
-        return STEPS[: _IN_FLIGHT + 1], ("landed",), ()
+        return _Readiness(steps=STEPS[: _IN_FLIGHT + 1], lost=("landed",), losses=())
     if standing.has_not_landed and "landed" in steps:
-        return tuple(step for step in steps if step != "landed"), ("landed",), ()
+        return _Readiness(steps=tuple(step for step in steps if step != "landed"), lost=("landed",), losses=())
     if len(steps) > _IN_FLIGHT + 1 or not steps:
-        return steps, (), ()
+        return _Readiness(steps=steps, lost=(), losses=())
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        in_flight = tuple(
-            Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
-            for kind in kinds
-            if texts[kind].what_in_flight
-        )
-        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), in_flight
+        steps = STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1]
+        return _Readiness(steps=steps, lost=(), losses=_in_flight(kinds, texts))
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))
     losses = tuple(
         Loss(kind=kind, what=_what(kind, texts, standing), way_on=_way_on(texts[kind], standing)) for kind in kinds
     )
-    return steps[:kept], steps[kept:], losses
+    return _Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
 
 
 def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessStep:
@@ -306,6 +311,14 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     if status.state == "gone":
         return "link silent"
     return status.unready or None
+
+
+def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tuple[Loss, ...]:
+    return tuple(
+        Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
+        for kind in kinds
+        if texts[kind].what_in_flight
+    )
 
 
 def _count(kept: ReadinessStep | None) -> int:

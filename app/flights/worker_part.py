@@ -4,7 +4,7 @@ flight, in memory so that nothing blocks.
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,12 +19,12 @@ from app.vehicles.flight_end import StopRequest
 T = TypeVar("T")
 
 
-@dataclass(slots=True, eq=False)
 class AbortFlag:
     """Request to end one flight. Set once, from any thread; the listener is notified at once."""
 
-    request: StopRequest | None = None
-    _tell: Callable[[StopRequest], None] = lambda _request: None
+    def __init__(self) -> None:
+        self.request: StopRequest | None = None
+        self._tell: Callable[[StopRequest], None] = lambda _request: None
 
     def set(self, request: StopRequest) -> None:
         """Set the flag; only the first request counts."""
@@ -39,13 +39,13 @@ class AbortFlag:
             tell(self.request)
 
 
-@dataclass(slots=True, eq=False)
 class AbortRegistry:
     """Abort flags of the flights of this process, by trial. Lock-free: safe from any thread and from signal
     handlers."""
 
-    _flags: dict[int, AbortFlag] = field(default_factory=dict)
-    _closed: StopRequest | None = None
+    def __init__(self) -> None:
+        self._flags: dict[int, AbortFlag] = {}
+        self._closed: StopRequest | None = None
 
     def register(self, trial_id: int) -> AbortFlag:
         """Return the trial's flag; in a closed registry it is set already."""

@@ -1,34 +1,25 @@
-"""The program's processes: the start of those that fly and compute, which are forked from a server that has imported
-the numerics once; and exclusive locks, which the operating system releases when their process ends, however it ends.
+"""Start of the processes that fly and compute: each is forked from a server that has imported the numerics once.
 
 A new interpreter needs seconds of processor time to import them, a fork a few milliseconds. The server has one thread
 and only forks, so that a fork never copies a held lock. Where forking a process that has loaded system libraries is not
 safe (macOS), each process is a new interpreter.
 """
 
-import fcntl
-import json
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing import get_context, parent_process
 from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.forkserver import ensure_running
-from pathlib import Path
 from traceback import format_exc
 from typing import Any, Final, Self, TypeVar
 
-from app.common.errors import StorageError
-from app.core.clock import REAL_TIME, Clock
-
 DEATH_TIMEOUT_S: Final = 5.0
 """How long a process whose end of the pipe is closed may take to end."""
-LOCK_POLL_S: Final = 0.1
 
 T = TypeVar("T")
 
@@ -152,82 +143,3 @@ def ignore_stop_signals() -> None:
     """Set up a child process that holds a vehicle: it ends when its pipe is closed, never in the middle of a flight."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Holder:
-    """Holder of a lock: process id, and its web address, empty if it has none."""
-
-    pid: int
-    address: str = ""
-
-    def __str__(self) -> str:
-        return f"process {self.pid}" + (f" at {self.address}" if self.address else "")
-
-
-class LockedError(Exception):
-    """The lock is held; `holder` is None when it is unknown."""
-
-    def __init__(self, holder: Holder | None) -> None:
-        super().__init__(f"held by {holder or 'another process'}")
-        self.holder = holder
-
-
-@contextmanager
-def exclusive(
-    path: Path, *, keep_waiting: Callable[[], bool] = lambda: False, clock: Clock = REAL_TIME
-) -> Iterator[Callable[[str], None]]:
-    """Hold the lock file at `path`. Yields a function that writes the holder's address into it.
-
-    Raises LockedError when another process holds it and `keep_waiting()` is false, StorageError when the file cannot be
-    opened.
-    """
-    try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-    except OSError as error:
-        raise StorageError(
-            f"The lock file {path} cannot be opened: {error.strerror}.",
-            hint="Give this user read and write permission for it, or choose another folder with --data-dir.",
-        ) from error
-    try:
-        while not _take(descriptor):
-            if not keep_waiting():
-                raise LockedError(_holder(descriptor))
-            clock.wait_s(LOCK_POLL_S)
-        _sign(descriptor, "")
-        yield partial(_sign, descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def signature(path: Path) -> Holder | None:
-    """The present or last holder of the lock file at `path`; None if it is unknown."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except OSError:
-        return None
-    try:
-        return _holder(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def _take(descriptor: int) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-def _sign(descriptor: int, address: str) -> None:
-    with suppress(OSError):  # a full disk costs only the signature, not the lock
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, json.dumps(asdict(Holder(pid=os.getpid(), address=address))).encode(), 0)
-
-
-def _holder(descriptor: int) -> Holder | None:
-    try:
-        return Holder(**json.loads(os.pread(descriptor, 4096, 0)))
-    except (ValueError, TypeError):
-        return None

@@ -1,5 +1,6 @@
 """Calls of functions in processes of their own: a pool for pure functions, which replaces processes that die; and a new
-process with limits of time and memory for each untrusted file, so that the worst result is an error.
+process with limits of time and memory for each untrusted file, so that the worst result is an error. Imports very
+little, so that such a process starts quickly.
 """
 
 import os
@@ -157,17 +158,24 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
             f"{MAX_CONCURRENT} files are already being read.",
             hint="Send this file again in a few seconds; nothing was stored.",
         )
-    task = partial(function, *args, **kwargs)
     try:
-        with ChildProcess(_perform, limits, task, name="reading") as child:
-            if not child.pipe.poll(limits.wall_s):
-                raise _too_much(limits)
-            outcome: T | TaskError = child.receive()
-        return result_of(outcome)
-    except (ProcessDiedError, MemoryError) as error:  # it used up the processor time or the memory
-        raise _too_much(limits) from error
+        return _run_limited(limits, partial(function, *args, **kwargs))
     finally:
         _places.release()
+
+
+def _run_limited(limits: Limits, task: Callable[[], T]) -> T:
+    with ChildProcess(_perform, limits, task, name="reading") as child:
+        if not child.pipe.poll(limits.wall_s):
+            raise _too_much(limits)
+        try:
+            outcome: T | TaskError = child.receive()
+        except ProcessDiedError as error:  # the processor time was used up, or the system ran out of memory
+            raise _too_much(limits) from error
+    try:
+        return result_of(outcome)
+    except MemoryError as error:
+        raise _too_much(limits) from error
 
 
 def _perform(pipe: Connection, limits: Limits, task: Callable[[], object]) -> None:

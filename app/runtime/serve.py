@@ -26,7 +26,8 @@ from app.common.errors import AddressError, AlreadyRunningError, Problem
 from app.common.logging import configure_logs, say
 from app.common.settings import Settings
 from app.db.revision import is_current
-from app.processes import LockedError, exclusive, start_loading
+from app.processes import start_loading
+from app.processes.locks import LockedError, exclusive
 from app.web.addresses import exposure, web_address
 
 FIRST_PAUSE_S: Final = 0.2
@@ -58,6 +59,7 @@ class WorkerSupervisor:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._stopping = threading.Event()
+        self._process: BaseProcess | None = None
         self._thread = threading.Thread(target=self._watch, name="worker supervisor", daemon=True)
 
     def __enter__(self) -> Self:
@@ -68,16 +70,19 @@ class WorkerSupervisor:
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
         self._thread.join()
-        if self._process.is_alive():
-            self._process.terminate()
+        process = self._process
+        if process is None:
+            return
+        if process.is_alive():
+            process.terminate()
         try:
-            self._process.join(STOP_TIMEOUT_S)
+            process.join(STOP_TIMEOUT_S)
         finally:
-            if self._process.is_alive():
-                _log.error("child did not stop; killing it", child="worker", pid=self._process.pid)
-                _dump_stacks(self._process)
-                self._process.kill()
-                self._process.join()
+            if process.is_alive():
+                _log.error("child did not stop; killing it", child="worker", pid=process.pid)
+                _dump_stacks(process)
+                process.kill()
+                process.join()
 
     def _start(self) -> BaseProcess:
         process = get_context("spawn").Process(target=run_worker_process, args=(self._settings,), name="worker")
@@ -90,6 +95,7 @@ class WorkerSupervisor:
         started_s = time.monotonic()
         while not self._stopping.is_set():
             process = self._process
+            assert process is not None
             process.join(0.1)
             if process.is_alive() or self._stopping.is_set():
                 continue

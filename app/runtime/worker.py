@@ -41,8 +41,9 @@ from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
 from app.live.messages import PublishedMessage, WorkerHello, live_address
-from app.processes import LockedError, exclusive, when_parent_ends
+from app.processes import when_parent_ends
 from app.processes.calls import ComputePool
+from app.processes.locks import LockedError, exclusive
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
 from app.vehicles.flight_end import Requester, StopRequest
@@ -79,8 +80,10 @@ def run_worker(settings: Settings) -> None:
     Raises AlreadyRunningError when another worker uses this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
+    abort_registry, ending = AbortRegistry(), ShutdownRequest()
+    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     try:
-        _run(settings, ShutdownRequest(), (signal.SIGINT, signal.SIGTERM), keep_waiting=lambda: False)
+        _run(settings, ending, abort_registry, keep_waiting=lambda: False)
     except LockedError as error:
         raise AlreadyRunningError(
             f"Another Gainline worker ({error.holder or 'its process is unknown'}) already uses "
@@ -95,21 +98,16 @@ def run_supervised_worker(settings: Settings) -> None:
 
     It waits while an older worker ends, and ends with its parent once its flights are over.
     """
-    ending = ShutdownRequest()
+    abort_registry, ending = AbortRegistry(), ShutdownRequest()
+    _install_signal_handlers(signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     when_parent_ends(partial(ending.set, "the web process has exited"))
     with suppress(LockedError):  # stopped while it waited for the lock
-        _run(settings, ending, (signal.SIGTERM,), keep_waiting=lambda: not ending.event.is_set())
+        _run(settings, ending, abort_registry, keep_waiting=lambda: not ending.event.is_set())
 
 
 def _run(
-    settings: Settings,
-    ending: ShutdownRequest,
-    signals: Sequence[signal.Signals],
-    *,
-    keep_waiting: Callable[[], bool],
+    settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, *, keep_waiting: Callable[[], bool]
 ) -> None:
-    abort_registry = AbortRegistry()
-    _install_signal_handlers(signals, ending, abort_registry)
     prepare_data_dir(settings.data_dir)
     narrowed = make_private(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
@@ -121,9 +119,7 @@ def _run(
         Worker(settings, ending, abort_registry).work()
 
 
-def _install_signal_handlers(
-    signals: Sequence[signal.Signals], ending: ShutdownRequest, abort_registry: AbortRegistry
-) -> None:
+def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, abort_registry: AbortRegistry) -> None:
     """Install signal handlers that only queue the request, because the interrupted thread may hold any lock; a separate
     thread handles it."""
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()

@@ -64,10 +64,17 @@ class _Flight:
         self.simulation.autopilot[Z_SUM_ERR] = 0
 
 
-AIRFRAMES: Final[Mapping[str, tuple[VehicleKind, Callable[[dict[str, float], int], Simulated]]]] = MappingProxyType(
-    {"jsbsim": (JSBSIM, JsbsimFlight), "twin": (TWIN, TwinFlight)}
+@dataclass(frozen=True, slots=True)
+class Airframe:
+    """A vehicle kind whose simulation a drone can fly; `flight` creates it from options and seed."""
+
+    kind: VehicleKind
+    flight: Callable[[dict[str, float], int], Simulated]
+
+
+AIRFRAMES: Final[Mapping[str, Airframe]] = MappingProxyType(
+    {"jsbsim": Airframe(JSBSIM, JsbsimFlight), "twin": Airframe(TWIN, TwinFlight)}
 )
-"""Vehicle kinds whose simulation a drone can fly, each with what creates it from options and seed."""
 
 
 def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> Body:
@@ -78,7 +85,7 @@ def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> 
             problems=(Problem("vehicle", f"must be one of {', '.join(AIRFRAMES)}, got {vehicle!r}"),),
             hint="jsbsim has six degrees of freedom; twin is a simple model with the real flights' scatter.",
         )
-    kind, simulate = AIRFRAMES[vehicle]
-    numbers = {name: float(value) for name, value in kind.check(options, field="vehicle").items()}
-    _Flight(simulate(numbers, seed)).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
-    return Body(lambda flight_seed: _Flight(simulate(numbers, flight_seed)), seed=seed)
+    airframe = AIRFRAMES[vehicle]
+    numbers = {name: float(value) for name, value in airframe.kind.check(options, field="vehicle").items()}
+    _Flight(airframe.flight(numbers, seed)).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
+    return Body(lambda flight_seed: _Flight(airframe.flight(numbers, flight_seed)), seed=seed)

@@ -154,6 +154,7 @@ Theme = Annotated[ThemeName, Query(description="colours for a light or a dark pa
 
 _IN_MEMORY_BYTES: Final = 2**20
 _CHUNK_BYTES: Final = 2**18
+_DOWNLOAD_CHUNK_BYTES: Final = 2**20
 _CSV: Final = "text/csv"
 _ANY: Final = "application/octet-stream"
 
@@ -307,5 +308,5 @@ def download(file: IO[bytes], name: str, *, media_type: str) -> StreamingRespons
 
 def _chunks(file: IO[bytes]) -> Iterator[bytes]:
     with file:
-        while chunk := file.read(_IN_MEMORY_BYTES):
+        while chunk := file.read(_DOWNLOAD_CHUNK_BYTES):
             yield chunk

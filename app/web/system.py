@@ -97,8 +97,8 @@ def _addresses(request: Request, settings: CurrentSettings) -> list[AddressInfo]
     return addresses_elsewhere(settings.host, port)
 
 
-KEPT_S: Final = 90 * 24 * 3600
-_HEADERS: Final = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
+_COOKIE_KEPT_S: Final = 90 * 24 * 3600
+_UNLOCK_HEADERS: Final = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
 """The token is in the address: these headers keep it out of caches and from the next page."""
 
 _UNLOCKED: Final = "/?unlocked"
@@ -163,8 +163,8 @@ def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") 
     given = keyring.given_to(caller.place)
     if not keyring.open_link(token):
         if caller.key >= given:  # the link was opened twice in the same browser
-            return RedirectResponse(_UNLOCKED, 303, headers=_HEADERS)
-        return HTMLResponse(_SPENT, 403, headers=_HEADERS)
-    answer = RedirectResponse(_UNLOCKED, 303, headers=_HEADERS)
-    answer.set_cookie(keyring.cookie, keyring.value(given), max_age=KEPT_S, httponly=True, samesite="strict")
+            return RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)
+        return HTMLResponse(_SPENT, 403, headers=_UNLOCK_HEADERS)
+    answer = RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)
+    answer.set_cookie(keyring.cookie, keyring.value(given), max_age=_COOKIE_KEPT_S, httponly=True, samesite="strict")
     return answer

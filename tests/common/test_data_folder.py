@@ -10,7 +10,7 @@ import pytest
 
 from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import StorageError
-from app.processes import exclusive
+from app.processes.locks import exclusive
 from tests.runtime.processes import environment
 
 

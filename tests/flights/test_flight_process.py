@@ -17,11 +17,12 @@ from app.flights.flight_loop import FlightMonitor, run_simulations
 from app.flights.flight_process import FlightProcess
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import MAX_LINE_BYTES, FlightPhase, PublishedMessage, Telemetry, encode
-from app.processes import exclusive
+from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle
 from tests.clocks import ManualClock
+from tests.flights.process_ids import pid_of
 
 GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 
@@ -186,7 +187,7 @@ def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) 
 
     def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            os.kill(flight_process._child._process.pid or 0, signal.SIGKILL)
+            os.kill(pid_of(flight_process), signal.SIGKILL)
 
     with pytest.raises(VehicleError, match=r"exit code -9"):
         fly(flight_process, flight_of(speed=1.0), kill)

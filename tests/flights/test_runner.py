@@ -34,6 +34,7 @@ from tests.builders import create_ready_campaign, create_record, create_trial, g
 from tests.campaigns.trials.states import make_vehicle_real
 from tests.clocks import SimulatedClock
 from tests.conftest import Listen
+from tests.flights.process_ids import pid_of
 
 Watch = Callable[[PublishedMessage], None]
 
@@ -65,7 +66,7 @@ class RunnerFixture:
 
     def kill_processes(self) -> None:
         for process in self.runner._process_pool._waiting:
-            os.kill(process._child._process.pid or 0, signal.SIGKILL)
+            os.kill(pid_of(process), signal.SIGKILL)
 
     def _session(self, vehicle_id: int) -> FlightProcess:
         raise AssertionError(f"Vehicle {vehicle_id} is flown without a link.")

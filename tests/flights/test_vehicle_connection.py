@@ -17,6 +17,7 @@ from app.flights.flight_process import VehicleConnection
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleCommand
 from app.live.messages import VehicleStatus
 from app.vehicles.base import Identity, LinkedVehicle
+from tests.flights.process_ids import pid_of
 from tests.waiting import Waits
 
 IDENTITY = Identity(system_id=1, autopilot="paparazzi", version="5.18")
@@ -161,7 +162,7 @@ def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(
             assert (silent.vehicle_id, silent.state, silent.step, silent.armed) == (5, "not answering", "record", True)
             assert "commands do not reach the vehicle" in silent.trouble
             assert "remote control" in silent.trouble
-        assert one._child._process.pid is not None
+        assert pid_of(one) > 0
         one.send_command("land", "go on", 1.0)
         assert isinstance(next_but_silence(heard), CommandForwarded)
         assert next_but_silence(heard) == STATUS
@@ -183,6 +184,5 @@ def test_orders_to_a_process_that_reads_nothing_hold_up_nobody(tmp_path: Path) -
         answers = [one.send_command("land", "again and again", 1.0) for _ in range(5000)]
         assert not answers[0].done()
         assert "not responding" in told(answers[-1])
-        assert one._child._process.pid is not None
-        os.kill(one._child._process.pid, signal.SIGKILL)
+        os.kill(pid_of(one), signal.SIGKILL)
         assert "it is unknown whether the command was sent" in told(answers[0])

@@ -5,7 +5,7 @@ import pytest
 
 from app.autopilots.ardupilot.loop_check import COLUMNS, read_ardupilot_trace
 from app.autopilots.ardupilot.replica.parameters import Parameters
-from app.autopilots.ardupilot.replica.replay import LoopTrace
+from app.autopilots.ardupilot.replica.replay import Hover, LoopTrace
 from app.core.errors import InputError
 from app.logs.trace_table import has_columns
 
@@ -32,7 +32,7 @@ def read(text: bytes) -> LoopTrace:
 def test_parameters_start_inputs_and_outputs_are_read() -> None:
     trace = read(content())
     assert trace.parameters == Parameters(position_p_1_s=2.0, climb_m_s=3.0, descent_m_s=1.2)
-    assert (trace.dt_s, trace.hover) == (0.0025, (0.39, 6.0, 0.1, -0.2))
+    assert (trace.dt_s, trace.hover) == (0.0025, Hover(throttle=0.39, z_m=6.0, v_m_s=0.1, a_m_s2=-0.2))
     assert trace.time_s.tolist() == [0.0]
     assert trace.inputs.tolist() == [[6.0, 6.1, 0.2, 0.3, 0.0, 1.0]]
     assert trace.outputs.tolist() == [[6.2, 0.4, 0.5, 0.6, 0.7, -60.0, 0.38, 0.39]]

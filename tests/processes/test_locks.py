@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from app.processes import Holder, LockedError, exclusive
+from app.processes.locks import Holder, LockedError, exclusive
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from app.processes import exclusive
+from app.processes.locks import exclusive
 with exclusive(Path(sys.argv[1])) as sign:
     sign("http://127.0.0.1:1")
     print("held", flush=True)

@@ -31,8 +31,8 @@ from app.autopilots.ardupilot.replica.parameters import (
 )
 from app.autopilots.ardupilot.replica.replay import climb_rate_targets
 from app.autopilots.copter_loop import CopterLoop
-from app.core.analysis import recorded_flight
 from app.core.analysis.loop import GainSpace, LoggedFlight, LoopTexts, Run, mean_over, transition_of
+from app.core.analysis.recorded_flight import FlownSteps, require_channels, segment_of, unanswered, whole_steps
 from app.core.analysis.segment import LEAD_S, Segment, Steps
 from app.core.control.parameter_checks import PLAUSIBLE, require_within
 from app.core.experiments.base import Experiment, Scatter
@@ -245,7 +245,7 @@ def ardupilot_loop(parameters: Mapping[str, float]) -> ArduPilotLoop:
         parameters=parameters_from(given),
         filter_hz=given.get(ACCELEROMETER_FILTER, ACCELEROMETER_FILTER_HZ),
         step_s=step_s,
-        row_s=recorded_flight.whole_steps(step_s),
+        row_s=whole_steps(step_s),
     )
 
 
@@ -258,14 +258,14 @@ def shaped_reference(loop: ArduPilotLoop, set_points: SetPoints, steps_s: Sample
     return references
 
 
-def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: recorded_flight.Steps) -> LoggedFlight:
+def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: FlownSteps) -> LoggedFlight:
     """The flight of a trajectory with these channels, from 2 s before the first step to the end.
 
     Raises TrajectoryError if a channel is missing or too sparse, and if the reference is not the one that the loop
     shapes.
     """
-    recorded_flight.require_channels(trajectory, steps)
-    rows_s, steps_s = steps.rows_s(recorded_flight.whole_steps(loop.step_s)), steps.steps_s(loop.step_s)
+    require_channels(trajectory, steps)
+    rows_s, steps_s = steps.rows_s(whole_steps(loop.step_s)), steps.steps_s(loop.step_s)
     reference = shaped_reference(loop, _on_time(loop, trajectory, steps), steps_s)
     z_d, v_d, a_d = (np.interp(rows_s, steps_s, reference[:, column]) for column in range(3))
     demanded = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
@@ -276,15 +276,13 @@ def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: recorded_
     return LoggedFlight(
         loop=loop,
         segments=[
-            recorded_flight.segment_of(
-                trajectory, rows_s, (z_d, v_d, a_d), steps_s, sent, np.full(len(rows_s), np.nan)
-            ),
+            segment_of(trajectory, rows_s, (z_d, v_d, a_d), steps_s, sent, np.full(len(rows_s), np.nan)),
         ],
         activity=float(np.std(moved[scored])),
     )
 
 
-def _on_time(loop: ArduPilotLoop, trajectory: Trajectory, steps: recorded_flight.Steps) -> SetPoints:
+def _on_time(loop: ArduPilotLoop, trajectory: Trajectory, steps: FlownSteps) -> SetPoints:
     """The set points at the times at which the recorded reference shows them, found one after the other."""
     found, misfit_m = steps.set_points, 0.0
     for place, end_s in enumerate((*found.times_s[2:], steps.end_s), start=1):
@@ -294,7 +292,7 @@ def _on_time(loop: ArduPilotLoop, trajectory: Trajectory, steps: recorded_flight
             time_s = min((time_s + lateness_s).tolist(), key=misfit)
         found, misfit_m = _with_time(found, place, time_s), max(misfit_m, misfit(time_s))
     if misfit_m > _LARGEST_MISFIT_M:
-        raise recorded_flight.unanswered(
+        raise unanswered(
             "reference_m",
             f"differs by {misfit_m:.2f} m from the target that ArduCopter shapes from the set points with the "
             "vehicle's parameters",
@@ -310,7 +308,7 @@ def _with_time(set_points: SetPoints, place: int, time_s: float) -> SetPoints:
 def _misfit(
     loop: ArduPilotLoop,
     trajectory: Trajectory,
-    steps: recorded_flight.Steps,
+    steps: FlownSteps,
     set_points: SetPoints,
     place: int,
     window_s: tuple[float, float],

@@ -18,7 +18,7 @@ from app.autopilots.ardupilot.replica.parameters import (
     UNSUPPORTED,
     parameters_from,
 )
-from app.autopilots.ardupilot.replica.replay import LoopLog, LoopTrace, replayed, replica_of
+from app.autopilots.ardupilot.replica.replay import Hover, LoopLog, LoopTrace, replayed, replica_of
 from app.autopilots.ardupilot.replica.vertical import INPUTS, OUTPUTS
 from app.autopilots.loop_check import (
     LoopCheck,
@@ -119,7 +119,7 @@ def _values(checks: TraceChecks, described: Mapping[str, object]) -> dict[str, f
     return values | {each: checks.number_in(slew, each) for each in slew}
 
 
-def _start(checks: TraceChecks, described: Mapping[str, object]) -> tuple[float, float, float, float] | None:
+def _start(checks: TraceChecks, described: Mapping[str, object]) -> Hover | None:
     start = str(described.get("start"))
     if start.startswith("ramp"):
         return None
@@ -127,7 +127,7 @@ def _start(checks: TraceChecks, described: Mapping[str, object]) -> tuple[float,
         raise checks.malformed("line 1, start", f"must be hover or ramp, got {start[:40]!r}")
     first = checks.object_in(described, "init")
     z_m, v_m_s, a_m_s2, throttle = (checks.number_in(first, each) for each in ("z_m", "v_m_s", "a_m_s2", "throttle"))
-    return throttle, z_m, v_m_s, a_m_s2
+    return Hover(throttle, z_m, v_m_s, a_m_s2)
 
 
 def _notes(rows: Mapping[str, int]) -> Iterable[str]:

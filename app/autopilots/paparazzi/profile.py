@@ -61,7 +61,7 @@ def _is_block(number: int, reply: Measurement) -> bool:
 
 def _conclude(target: Target) -> tuple[Outgoing, ...]:
     """Return the end of the listing of blocks, which otherwise prevents every change of block for 15 s."""
-    return (Outgoing("MISSION_ACK", _to(target) | {"type": 0}),)
+    return (_acknowledge(target),)
 
 
 def _refer_to_ground(target: Target) -> tuple[Step, ...]:
@@ -97,9 +97,13 @@ def _to(target: Target) -> dict[str, float]:
     return {"target_system": target.system, "target_component": 0}
 
 
+def _acknowledge(target: Target) -> Outgoing:
+    return Outgoing("MISSION_ACK", _to(target) | {"type": 0})
+
+
 def _block(target: Target, name: str) -> tuple[Outgoing, ...]:
     activate = Outgoing("SCRIPT_ITEM", {**_to(target), "seq": target.blocks[name], "name": ""})
-    return (*_conclude(target), activate)
+    return (_acknowledge(target), activate)
 
 
 def _climb_here(target: Target) -> Outgoing:

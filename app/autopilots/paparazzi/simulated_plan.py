@@ -127,6 +127,7 @@ class FlightPlan:
         return LAND_HERE if is_over else None
 
 
+NAME_LIMIT: Final = 16
 KILL_SETTING: Final = "kil_thr"
 NEWER_KILL_SETTING: Final = "aut_kil_thr"
 """Name in a source tree of 2017 (version 5.10), in which the variables are in one structure."""
@@ -148,7 +149,7 @@ def settings(kill_setting: str) -> Parameters:
     """Return the settings with their values after the start; `kill_setting` is this release's name of the one that
     stops the throttle, empty if there is none."""
     named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
-    return Parameters([each for each in named if each.name], longest_name=15)
+    return Parameters([each for each in named if each.name], longest_name=NAME_LIMIT - 1)
 
 
 SETTINGS: Final = (

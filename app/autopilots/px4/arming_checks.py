@@ -61,7 +61,10 @@ class _Report:
         """Return the failing components; if the chunk is whole, only those with a check for this group of modes."""
         if not self.is_whole or group is None:
             return self.errors
-        return self.errors & sum({1 << component for modes, component in self.checks if modes >> group & 1})
+        about = 0
+        for modes, component in self.checks:
+            about |= 1 << component if modes >> group & 1 else 0
+        return self.errors & about
 
 
 class Px4ArmingChecks(ArmingChecks):
@@ -93,8 +96,10 @@ class Px4ArmingChecks(ArmingChecks):
 
     def failing(self, mode: str) -> tuple[str, ...]:
         """Return the components that prevent arming in this mode, or in any mode if modes cannot be distinguished."""
-        failing = [report.failing(MODE_GROUPS.get(mode)) for report in self._reports.values()]
-        return tuple(name for bit, name in enumerate(COMPONENTS) if bit and any(each >> bit & 1 for each in failing))
+        failing = 0
+        for report in self._reports.values():
+            failing |= report.failing(MODE_GROUPS.get(mode))
+        return tuple(name for bit, name in enumerate(COMPONENTS) if bit and failing >> bit & 1)
 
     @property
     def arming_modes(self) -> frozenset[str]:

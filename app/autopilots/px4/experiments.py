@@ -27,9 +27,9 @@ from app.autopilots.px4.replica.parameters import (
     parameters_from,
     step_parameters,
 )
-from app.core.analysis import recorded_flight
 from app.core.analysis.hover import found_hover
 from app.core.analysis.loop import GainSpace, LoggedFlight, LoopTexts, Run, mean_over, transition_of
+from app.core.analysis.recorded_flight import FlownSteps, require_channels, segment_of, whole_steps
 from app.core.analysis.segment import LEAD_S, Segment, Steps, interpolated
 from app.core.control.parameter_checks import PLAUSIBLE, require_within
 from app.core.experiments.base import Experiment, Scatter
@@ -305,19 +305,19 @@ def px4_loop(parameters: Mapping[str, float]) -> Px4Loop:
     return Px4Loop(
         parameters=given,
         step_s=step_s,
-        row_s=recorded_flight.whole_steps(step_s),
+        row_s=whole_steps(step_s),
         descent_m_s=given.descent_m_s,
         hover_deviation=hover_deviation(parameters),
     )
 
 
-def read_px4(loop: Px4Loop, trajectory: Trajectory, steps: recorded_flight.Steps) -> LoggedFlight:
+def read_px4(loop: Px4Loop, trajectory: Trajectory, steps: FlownSteps) -> LoggedFlight:
     """The flight of a trajectory with these channels, from 2 s before the first step to the end. The loop assumes the
     hover throttle that its own estimator finds: the mean of the flight, within the estimator's limits.
 
     Raises TrajectoryError if a channel is missing or too sparse.
     """
-    recorded_flight.require_channels(trajectory, steps)
+    require_channels(trajectory, steps)
     rows_s, steps_s = steps.rows_s(loop.row_s), steps.steps_s(loop.step_s)
     z_d = np.interp(rows_s, trajectory.time_s, trajectory["reference_m"])
     still = np.zeros(len(rows_s))
@@ -325,7 +325,7 @@ def read_px4(loop: Px4Loop, trajectory: Trajectory, steps: recorded_flight.Steps
     sent = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
     hover = np.full(len(rows_s), found_hover(loop, float(sent.mean())))
     return LoggedFlight(
-        loop=loop, segments=[recorded_flight.segment_of(trajectory, rows_s, (z_d, still, pushed), steps_s, sent, hover)]
+        loop=loop, segments=[segment_of(trajectory, rows_s, (z_d, still, pushed), steps_s, sent, hover)]
     )
 
 

@@ -22,7 +22,7 @@ _LEAST_VARIATION: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Steps:
+class FlownSteps:
     """The scored steps of a flight: its set points, and the scored time, s since the command."""
 
     set_points: SetPoints
@@ -73,7 +73,7 @@ def segment_of(
     )
 
 
-def require_channels(trajectory: Trajectory, steps: Steps) -> None:
+def require_channels(trajectory: Trajectory, steps: FlownSteps) -> None:
     """Require the channels, often enough. Raises TrajectoryError for the first that does not suffice."""
     for name in CHANNELS:
         if name not in trajectory.channels:

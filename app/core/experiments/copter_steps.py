@@ -16,7 +16,7 @@ import numpy as np
 from app.core.analysis.hover import HoverAdvice, advise_hover, found_hover
 from app.core.analysis.loop import AltitudeLoop, LinearLoop, LoggedFlight, Run
 from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
-from app.core.analysis.recorded_flight import Steps
+from app.core.analysis.recorded_flight import FlownSteps
 from app.core.definition import OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import (
@@ -132,9 +132,9 @@ class CopterSteps(ModelledExperiment):
         it assumes."""
 
     @property
-    def steps(self) -> Steps:
+    def steps(self) -> FlownSteps:
         """The scored part of a flight."""
-        return Steps(set_points=self.set_points, begin_s=self.scored_from_s, end_s=self.window_s)
+        return FlownSteps(set_points=self.set_points, begin_s=self.scored_from_s, end_s=self.window_s)
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The experiment with another sequence; itself if that is its own."""

@@ -8,7 +8,7 @@ import pytest
 from app.autopilots.ardupilot.experiments import ardupilot_loop, read_ardupilot, shaped_reference
 from app.autopilots.px4.experiments import px4_loop, read_px4
 from app.core.analysis.prediction import FlightModel
-from app.core.analysis.recorded_flight import Steps
+from app.core.analysis.recorded_flight import FlownSteps
 from app.core.analysis.segment import FinerSegment
 from app.core.errors import TrajectoryError
 from app.core.models.copter import Copter
@@ -16,7 +16,7 @@ from app.core.models.set_points import SetPoints
 from app.core.records.trajectory import Trajectory
 from tests.core.tuning.flying import compiled_only
 
-STEPS = Steps(set_points=SetPoints((0.0, 4.0, 7.0), (3.0, 2.0, 3.0)), begin_s=4.0, end_s=10.0)
+STEPS = FlownSteps(set_points=SetPoints((0.0, 4.0, 7.0), (3.0, 2.0, 3.0)), begin_s=4.0, end_s=10.0)
 LATE = SetPoints((0.0, 4.13, 7.02), (3.0, 2.0, 3.0))
 TIME_S = np.arange(0.0, 19.4, 0.02)
 
@@ -91,7 +91,7 @@ def test_px4_follows_the_recorded_set_point_with_the_hover_throttle_of_the_fligh
 
 
 def test_px4_at_one_set_point_has_no_step_that_could_be_late() -> None:
-    still = Steps(set_points=SetPoints((0.0,), (3.0,)), begin_s=4.0, end_s=10.0)
+    still = FlownSteps(set_points=SetPoints((0.0,), (3.0,)), begin_s=4.0, end_s=10.0)
     (segment,) = read_px4(px4_loop({}), recorded(reference_m=3.0), still).segments
     assert segment.z_d_m.tolist() == [3.0] * len(segment.z_d_m)
     assert not segment.a_d_m_s2.any(), "nothing is fed forward"

@@ -8,7 +8,7 @@ the next.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,18 +22,26 @@ SHAPED: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
 _LONGEST_INTERVAL_S: Final = 0.5
 
 
+class Hover(NamedTuple):
+    """A start in flight: throttle demanded and filtered, altitude in m, climb rate in m/s and acceleration in m/s²."""
+
+    throttle: float
+    z_m: float
+    v_m_s: float
+    a_m_s2: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopTrace:
     """Recorded inputs and outputs of the loop, one row per step of `dt_s`.
 
     `time_s` has shape (n,), `inputs` (n, 6) in the order of `INPUTS`, `outputs` (n, 8) in that of `OUTPUTS`; n ≥ 1.
-    `hover` is a start in flight: throttle demanded and filtered, altitude in m, climb rate in m/s and acceleration in
-    m/s²; without it the run starts on the ground, as the throttle begins to rise.
+    Without `hover` the run starts on the ground, as the throttle begins to rise.
     """
 
     parameters: Parameters
     dt_s: float
-    hover: tuple[float, float, float, float] | None
+    hover: Hover | None
     time_s: Samples
     inputs: Samples
     outputs: Samples

@@ -48,7 +48,7 @@ WINDOW_STEPS: Final = RATE_HZ
 _ROUNDS: Final = 40
 _DIFFERENCE: Final = 1e-5
 _LARGEST_STEP: Final = 0.5
-_FITTED: Final = 0.01
+_FIT_TOLERANCE: Final = 0.01
 """The fit has converged once a step is below this share of the standard errors, and the noise changes by less."""
 _SINGLE_PRECISION: Final = 6e-8
 _SMALLEST: Final = 1e-12
@@ -57,7 +57,7 @@ _MIN_RECORD: Final = WINDOW_STEPS + 1
 _STARTS: Final = 256
 _SEARCHES: Final = 1
 _RESTARTS: Final = 8
-_SETTLED: Final = 1e-4
+_SEARCH_TOLERANCE: Final = 1e-4
 _MODELS: Final = 48
 _MIN_IMPROVEMENT: Final = 0.002
 """Smallest predicted improvement worth a flight, as a share of the best flight's expected error."""
@@ -184,7 +184,7 @@ def _fit(experiment: PitchTracking, windows: Cube, residuals: Residuals) -> tupl
         before = noise
         noise = np.maximum(_rms(residuals(experiment, model[np.newaxis], windows, noise)[0]), floor)
         moved = np.abs(step) / np.sqrt(np.diag(covariance))
-        if moved.max() < _FITTED and np.abs(noise / before - 1.0).max() < _FITTED:
+        if moved.max() < _FIT_TOLERANCE and np.abs(noise / before - 1.0).max() < _FIT_TOLERANCE:
             break
     return model, covariance
 
@@ -290,7 +290,7 @@ def _restarted(aircraft: PitchTracking, space: PolicySpace, start: Vector) -> Op
     best = model_optimum(aircraft, space, start)
     for _ in range(_RESTARTS):
         again = model_optimum(aircraft, space, best.gains)
-        settled = again.error > (1.0 - _SETTLED) * best.error
+        settled = again.error > (1.0 - _SEARCH_TOLERANCE) * best.error
         best = min(best, again, key=lambda end: end.error)
         if settled:
             break

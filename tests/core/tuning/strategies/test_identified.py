@@ -11,7 +11,7 @@ from app.core.tuning.strategy import Proposal
 from app.vehicles.f16 import LOG_NOISE
 from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import compiled_only
-from tests.core.tuning.test_identification import MODEL, flight
+from tests.core.tuning.strategies.test_identified_model import MODEL, flight
 from tests.vehicles.flying import HAND, TRACKING
 
 pytestmark = compiled_only

@@ -8,7 +8,7 @@ from app.core.definition import Definition
 from app.core.tuning.strategies import STRATEGIES
 from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
-from tests.core.tuning.test_identification import flight
+from tests.core.tuning.strategies.test_identified_model import flight
 from tests.vehicles.flying import HAND
 
 pytestmark = compiled_only
