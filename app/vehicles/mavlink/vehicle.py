@@ -11,7 +11,7 @@ from app.autopilots.autopilot import AutopilotError
 from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
-from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
+from app.vehicles.base import CheckItem, Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import FlightEnd, Landing, cause_text, withdrawn_by
 from app.vehicles.mavlink import parameters, preflight, preparation, records
 from app.vehicles.mavlink.connection import VehicleConnection
@@ -194,12 +194,16 @@ class MavlinkVehicle(VehicleConnection):
         except AutopilotError as error:
             raise VehicleError(error.message, hint=error.hint) from error
         hover = preflight.evaluate_hover(self._hover_throttle, limits)
-        plan_time_s = float(self._options["plan_time_s"])
-        flight_time = preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s)
-        time = (flight_time,) if radio.profile.flying_blocks else ()
+        time = self._evaluate_time(order)
         self._quarantine.require_none()
         preflight.require((*items, *time, *requirements, *hover, preflight.evaluate_set_points(order.set_points)))
         return watched
+
+    def _evaluate_time(self, order: FlightOptions) -> tuple[CheckItem, ...]:
+        """Check that the flight fits the vehicle's flight plan, if it has one."""
+        if not self._radio.profile.flying_blocks:
+            return ()
+        return (preflight.evaluate_flight_time(order.record_s, plan_time_s=float(self._options["plan_time_s"])),)
 
     def _fly(
         self,
