@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.core.analysis.margin import RINGING_DAMPING
 from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.definition import Definition, Flight
@@ -80,10 +80,10 @@ def error_of(vehicle: SampledVehicle, gains: Gains, seed: int = 0) -> float | No
 def tune(vehicle: SampledVehicle) -> Tuned:
     flights: list[Flight] = []
     errors: list[float | None] = []
-    proposal = next_proposal(DEFINITION, experiment_of(DEFINITION), flights)
+    proposal = next_proposal(evidence_of(DEFINITION, flights))
     for number in (1, 2):
         if number == 2:
-            proposal = next_proposal(DEFINITION, experiment_of(DEFINITION), flights)
+            proposal = next_proposal(evidence_of(DEFINITION, flights))
         record = fly(vehicle, proposal.gains, SEED + 100 * vehicle.number + number)
         try:
             error = STEPS.error(record)
@@ -165,7 +165,7 @@ def tune_over_link(number: int) -> Linked | None:
     except TrajectoryError:
         return None
     flight = Flight(number=1, gains=default, trajectory=record, error=first, outcome="valid")
-    proposal = next_proposal(DEFINITION, experiment_of(DEFINITION), [flight])
+    proposal = next_proposal(evidence_of(DEFINITION, [flight]))
     flown = [paparazzi_simulation.fly(STEPS, vehicle, proposal.gains, seed) for seed in seeds]
     usual = [paparazzi_simulation.fly(STEPS, vehicle, default, seed)[1] for seed in seeds]
     errors = tuple(STEPS.error(each) for each, _ in flown)

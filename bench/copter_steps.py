@@ -22,7 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
 from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.definition import Definition, Flight
@@ -143,10 +143,11 @@ def judge(number: int, *, name: str) -> Result:
     definition = Definition(experiment=experiment.name, strategy="calibrated")
     try:
         first = vehicle.first_flight(experiment.space.mapping(experiment.space.default), seeds[0])
-        proposal = next_proposal(definition, experiment_of(definition), [first])
+        evidence = evidence_of(definition, [first])
+        proposal = next_proposal(evidence)
     except TrajectoryError as error:
         return Result({}, {}, np.nan, "failed", 0, (), np.nan, frozenset(), frozenset(), str(error))
-    gate = check_policy(definition, experiment, experiment.space, proposal.gains, [first], spread=proposal.spread)
+    gate = check_policy(evidence, proposal.gains, spread=proposal.spread)
     loop = experiment.under(vehicle.parameters).loop(experiment.space.default)
     rules = loop.rules(vehicle.copter.hover_throttle)
     sets = {

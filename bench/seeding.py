@@ -20,6 +20,7 @@ from app.common.states import CampaignState, JobState, TrialState
 from app.core.definition import Definition
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.records.trajectory import Trajectory
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Explanation, Interval, band_channels
 from app.db import trajectories
@@ -41,9 +42,8 @@ _NOISE_M: Final = 0.008
 @cache
 def _gate() -> JsonObject:
     """Return the gate's complete result for gains that pass."""
-    experiment = Takeoff()
-    space = experiment.space
-    return gate_json(check_policy(Definition(), experiment, space, space.mapping(space.default), ()))
+    evidence = Evidence(definition=Definition(), experiment=Takeoff(), flights=())
+    return gate_json(check_policy(evidence, evidence.space.mapping(evidence.space.default)))
 
 
 @dataclass(frozen=True, slots=True)

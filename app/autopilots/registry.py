@@ -1,6 +1,6 @@
 """Registries of the autopilots and of the experiments: those of the autopilots, and one without any."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import chain, zip_longest
 from types import MappingProxyType
@@ -12,11 +12,12 @@ from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.autopilot import Autopilot
 from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.autopilots.px4.profile import PX4
-from app.core.definition import Definition, OptionValue
+from app.core.definition import Definition, Flight, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.policy import PolicySpace
+from app.core.tuning.evidence import Evidence
 
 AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType(
     {autopilot.name: autopilot for autopilot in (PAPARAZZI, ARDUPILOT, PX4)}
@@ -63,6 +64,19 @@ def experiment_of(definition: Definition) -> Experiment:
         return experiment
     mean, deviation = np.array([log.vehicle[each.name] for each in modelled.model_parameters]).T
     return modelled.informed(mean, deviation).under(log.parameters)
+
+
+def evidence_of(
+    definition: Definition, flights: Sequence[Flight], *, donor: Flight | None = None, open_until_flight: int = 0
+) -> Evidence[Experiment]:
+    """The evidence of these flights, with the experiment of the definition."""
+    return Evidence(
+        definition=definition,
+        experiment=experiment_of(definition),
+        flights=flights,
+        donor=donor,
+        open_until_flight=open_until_flight,
+    )
 
 
 def space_of(definition: Definition) -> PolicySpace:

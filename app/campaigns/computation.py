@@ -1,12 +1,13 @@
 """Computation of a proposal: pure and without the database, for compute processes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import ParameterDistribution
+from app.core.experiments.base import Experiment, ParameterDistribution
 from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.campaign_models import known_distribution
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import GateResult, check_policy
 from app.core.tuning.proposals import Advice, advise, next_proposal
 from app.core.tuning.stop_rules import StopVerdict, evaluate_stop_rule
@@ -29,6 +30,11 @@ class CampaignHistory:
     battery_v: float | None = None
     open_until_flight: int = 0
 
+    @property
+    def evidence(self) -> Evidence[Experiment]:
+        """The experiment, which has caches, is found anew in the process that computes."""
+        return evidence_of(self.definition, self.flights, donor=self.donor, open_until_flight=self.open_until_flight)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProposalComputation:
@@ -49,39 +55,19 @@ def compute(past: CampaignHistory) -> ProposalComputation:
 
     Takes up to a second, or some seconds under ArduCopter and PX4; call it outside of any transaction.
     """
-    stop, flights = past.definition.stop, past.flights
-    budget = max(stop.max_flights, past.open_until_flight)  # with the flights for which the campaign was reopened
-    definition = replace(past.definition, stop=replace(stop, max_flights=budget))
-    experiment = experiment_of(definition)
-    proposal = next_proposal(definition, experiment, flights, past.donor)
-    stop_verdict = evaluate_stop_rule(
-        past.definition, flights, proposal, battery_v=past.battery_v, open_until_flight=past.open_until_flight
-    )
-    spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
-    gate = check_policy(
-        definition,
-        experiment,
-        experiment.space.narrowed(definition.bounds),
-        proposal.gains,
-        flights,
-        start=proposal.gains if proposal.kind == "start" else None,
-        spread=spread,
-    )
+    evidence = past.evidence
+    proposal = next_proposal(evidence)
+    stop_verdict = evaluate_stop_rule(evidence, proposal, battery_v=past.battery_v)
+    spread = known_distribution(evidence) if proposal.spread is None else proposal.spread
+    start = proposal.gains if proposal.kind == "start" else None
     return ProposalComputation(
         history_digest=past.digest,
         proposal=proposal,
-        gate=gate,
+        gate=check_policy(evidence, proposal.gains, start=start, spread=spread),
         spread=spread,
-        flights=tuple(flight.number for flight in flights if flight.outcome == "valid"),
+        flights=tuple(flight.number for flight in evidence.valid),
         stop_verdict=stop_verdict,
-        advice=advise(
-            definition,
-            experiment,
-            flights,
-            proposal,
-            stop_verdict,
-            is_reopened=len(flights) < past.open_until_flight,
-        ),
+        advice=advise(evidence, proposal, stop_verdict),
     )
 
 
@@ -90,11 +76,5 @@ def warm_up() -> None:
     definition, experiment = Definition(), Takeoff()
     default = experiment.space.default
     flown = experiment.simulate(default, experiment.nominal_model)
-    flight = Flight(
-        number=1,
-        gains=experiment.space.mapping(default),
-        trajectory=flown,
-        error=experiment.error(flown),
-        outcome="valid",
-    )
+    flight = experiment.scored_flight(1, experiment.space.mapping(default), flown)
     compute(CampaignHistory(definition=definition, flights=(flight,), digest=""))

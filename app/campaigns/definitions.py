@@ -4,14 +4,14 @@ start, a flight of another campaign, looked up when the campaign is defined.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Final
 
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import EXPERIMENTS, experiment_of, get_experiment
+from app.autopilots.registry import EXPERIMENTS, evidence_of, experiment_of, get_experiment
 from app.campaigns import history, repository
 from app.campaigns.schemas import Definition as DefinitionIn
 from app.campaigns.schemas import Donor, Start
@@ -20,8 +20,8 @@ from app.common.states import TrialState
 from app.core.definition import Definition, problems_of_options
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
-from app.core.tuning.confirmation import compare_winner
 from app.core.tuning.definition_checks import check_definition, highest_set_point_m
+from app.core.tuning.evidence import Evidence
 from app.db.models import CampaignRow, TrialRow
 from app.db.types import JsonObject
 from app.fleet.schemas import VehicleChoice
@@ -52,6 +52,11 @@ def definition_of(row: CampaignRow) -> Definition:
 def experiment_of_campaign(row: CampaignRow) -> Experiment:
     """The experiment of a stored campaign, configured as defined there."""
     return experiment_of(_ADAPTER.validate_python(row.definition))
+
+
+def flown_evidence(row: CampaignRow, trials: Sequence[TrialRow]) -> Evidence[Experiment]:
+    """The evidence of a campaign's flights without their records: their groups, scatter and winner."""
+    return evidence_of(definition_of(row), history.flown_gains(trials))
 
 
 def frozen_digest(row: CampaignRow) -> str:
@@ -171,8 +176,9 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
         raise _refused("campaign_id", difference)
     trials = history.trials_of(session, campaign.id)
     if named.trial_number is None:
-        now = compare_winner(definition_of(campaign), experiment_of_campaign(campaign), history.flown_gains(trials))
-        found = None if now is None else history.best_of([row for row in trials if row.number in now.winner.numbers])
+        now = flown_evidence(campaign, trials)
+        best = now.winner.numbers if now.groups else ()
+        found = history.best_of([row for row in trials if row.number in best])
     else:
         found = next((row for row in trials if row.number == named.trial_number), None)
     if found is None or found.trajectory is None or (not named.checksum and found.state != TrialState.VALID):

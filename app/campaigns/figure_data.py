@@ -9,16 +9,15 @@ from typing import Final, Literal, cast
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import experiment_of
 from app.campaigns import history, repository
-from app.campaigns.definitions import definition_of, experiment_of_campaign
+from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
-from app.core.experiments.base import Experiment, Scatter
+from app.core.experiments.base import Experiment
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
-from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import Interval, band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, ProposalRow, TrialRow
@@ -107,9 +106,9 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     individually; the others have their coarse curves.
     """
     campaign = repository.get_campaign(session, campaign_id)
-    definition = definition_of(campaign)
-    experiment = experiment_of(definition)
     rows = history.trials_of(session, campaign_id)
+    evidence = flown_evidence(campaign, rows)
+    definition, experiment = evidence.definition, evidence.experiment
     flown = [row for row in rows if row.state in history.FLOWN]
     set_point, reference = _goal(experiment)
     bare = History(
@@ -123,7 +122,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         flights=tuple(_flight(row, corrected=history.is_corrected(rows, row.number)) for row in flown),
         proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
-        noise=_noise(rows, experiment.scatter),
+        noise=_noise(evidence),
         curves_title=experiment.curves_title,
         window=view.window,
         chosen=view.chosen,
@@ -152,14 +151,13 @@ def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
     )
 
 
-def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
+def _noise(now: Evidence[Experiment]) -> Noise | None:
     """Scatter of repeated flights, including the experiment's prior; None without a valid flight, while it is not
     known, and if there is none."""
-    groups = groups_of(history.flown_gains(rows))
-    scatter = pool_scatter(groups, prior)
+    groups, scatter = now.groups, now.scatter
     if not groups or scatter.reported is None:
         return None
-    best = select_winner(groups, scatter)
+    best = now.winner
     half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
     return Noise(
         sd=scatter.sigma,

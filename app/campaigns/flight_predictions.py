@@ -2,23 +2,21 @@
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import experiment_of, space_of
 from app.campaigns import history, repository
-from app.campaigns.definitions import definition_of
+from app.campaigns.definitions import flown_evidence
 from app.campaigns.proposals import read_donor
 from app.campaigns.schemas import GainsPrediction, PredictedCurve
-from app.common.states import TrialState
-from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory, select_samples
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.predictions import is_informative
 from app.core.tuning.proposals import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.strategy import Proposal, band_channels
@@ -97,32 +95,36 @@ def predict_planned(
     question = _question(session, campaign, gains)
     if ahead is not None and (ahead.digest, ahead.gains) == (question.digest, question.gains):
         return ahead.prediction
-    flights = history.flights_of(session, campaign.id, recorded=question.flown) if question.flown else ()
-    repeat = predict_repeat(question.experiment, flights, question.gains)
+    if not question.flown:
+        return None
+    flights = history.flights_of(session, campaign.id, recorded=question.flown)
+    repeat = predict_repeat(replace(question.evidence, flights=flights), question.gains)
     return _stored(question, _checked(question, repeat))
 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """A complete gain set in a campaign's history; `flown` are the numbers of the valid flights with these gains."""
+    """A complete gain set in a campaign's history, whose `evidence` lacks the records; `flown` are the numbers of the
+    valid flights with these gains."""
 
-    definition: Definition
+    evidence: Evidence[Experiment]
     trials: Sequence[TrialRow]
     gains: Gains
     digest: str
-    flown: set[int]
+    flown: Collection[int]
 
     @property
-    def experiment(self) -> Experiment:
-        return experiment_of(self.definition)
+    def output(self) -> str:
+        return self.evidence.experiment.output
 
 
 def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Question:
-    definition, trials = definition_of(campaign), history.trials_of(session, campaign.id)
-    gains = space_of(definition).complete(asked)
-    digest = history.history_digest(session, campaign, definition, trials)
-    flown = {row.number for row in trials if row.state == TrialState.VALID and row.gains == gains}
-    return _Question(definition, trials, gains, digest, flown)
+    trials = history.trials_of(session, campaign.id)
+    evidence = flown_evidence(campaign, trials)
+    gains = evidence.space.complete(asked)
+    digest = history.history_digest(session, campaign, evidence.definition, trials)
+    flown = next((group.numbers for group in evidence.groups if group.gains == gains), ())
+    return _Question(evidence, trials, gains, digest, flown)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +132,7 @@ class _Read:
     """All that a prediction needs of the database; `kept` is the model if it is fitted already."""
 
     question: _Question
-    flights: Sequence[Flight]
-    donor: Flight | None
+    evidence: Evidence[Experiment]
     kept: FittedModel | None
 
 
@@ -139,28 +140,17 @@ def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gain
     question = _question(session, repository.get_campaign(session, campaign_id), asked)
     kept = cache.find(question.digest)
     is_new = not question.flown and kept is None
-    modelled = modelled_flights(question.experiment, history.flown_gains(question.trials)) if is_new else set()
-    recorded = question.flown | modelled
-    return _Read(
-        question,
-        flights=history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else (),
-        donor=read_donor(session, question.definition) if is_new else None,
-        kept=kept,
-    )
+    recorded = modelled_flights(question.evidence) if is_new else question.flown
+    flights = history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else ()
+    donor = read_donor(session, question.evidence.definition) if is_new else None
+    return _Read(question, replace(question.evidence, flights=flights, donor=donor), kept)
 
 
 def _predict(cache: PredictorCache, read: _Read) -> Proposal | None:
     question, kept = read.question, read.kept
-    predicted = predict_repeat(question.experiment, read.flights, question.gains)
+    predicted = predict_repeat(read.evidence, question.gains)
     if predicted is None:
-        fitted = cache.get(
-            question.digest,
-            lambda: (
-                flight_predictor(question.definition, question.experiment, read.flights, read.donor)
-                if kept is None
-                else kept.predictor
-            ),
-        )
+        fitted = cache.get(question.digest, lambda: flight_predictor(read.evidence) if kept is None else kept.predictor)
         predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
     return _checked(question, predicted)
 
@@ -172,7 +162,7 @@ def _checked(question: _Question, predicted: Proposal | None) -> Proposal | None
     lower = None if predicted.interval is None else predicted.interval.lower
     if is_informative(lower, corrected=history.is_corrected(question.trials)):
         return predicted
-    curve = None if predicted.predicted is None else _only(predicted.predicted, question.experiment.output)
+    curve = None if predicted.predicted is None else _only(predicted.predicted, question.output)
     return replace(predicted, predicted=curve, predicted_error=None, interval=None)
 
 
@@ -180,20 +170,20 @@ def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
     """The prediction with as much of its curve and band as is drawn."""
     if predicted is None or predicted.predicted is None:
         return predicted
-    curve = _only(predicted.predicted, question.experiment.output, *band_channels(question.experiment.output))
-    chosen = select_samples(curve.time_s, curve[question.experiment.output], STORED_POINTS)
+    curve = _only(predicted.predicted, question.output, *band_channels(question.output))
+    chosen = select_samples(curve.time_s, curve[question.output], STORED_POINTS)
     thin = {name: values[chosen] for name, values in curve.channels.items()}
     return replace(predicted, predicted=replace(curve, time_s=curve.time_s[chosen], channels=thin))
 
 
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
     curve = None if predicted is None else predicted.predicted
-    lower, upper = (_edge(curve, channel) for channel in band_channels(question.experiment.output))
+    lower, upper = (_edge(curve, channel) for channel in band_channels(question.output))
     return GainsPrediction(
         gains=dict(question.gains),
         predicted_error=None if predicted is None else predicted.predicted_error,
         interval=None if predicted is None else predicted.interval,
-        curve=_curve(curve, question.experiment.output),
+        curve=_curve(curve, question.output),
         lower=lower,
         upper=upper,
     )

@@ -4,6 +4,7 @@ For a worker: `read_plan`, then `app.core.tuning.landscape` (pure, in any proces
 Only the newest landscape of a campaign is kept.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -19,7 +20,8 @@ from app.campaigns.proposals import is_stale, read_history
 from app.common.errors import GainlineError
 from app.common.states import JobState
 from app.core.formatting import percent
-from app.core.tuning.landscape import Landscape, LandscapeGrid, LandscapePlan, free_gains, plan_grid
+from app.core.policy import Gains
+from app.core.tuning.landscape import Landscape, LandscapeGrid, free_gains, plan_grid
 from app.db.models import CampaignRow, JobRow, ProposalRow
 from app.db.types import JsonObject
 from app.figures.base import Card, card_of
@@ -69,6 +71,15 @@ def request_landscape(session: Session, campaign_id: int) -> None:
     job.order = order  # a job that still waits may be for an outdated proposal
 
 
+@dataclass(frozen=True, slots=True)
+class LandscapePlan:
+    """What to compute, of which campaign: the gains through which the slices go, and those they must contain."""
+
+    past: CampaignHistory
+    centre: Gains
+    marks: Sequence[Gains]
+
+
 def read_plan(session: Session, campaign_id: int, order: JsonObject) -> LandscapePlan:
     """Read what the job's proposal was computed from. Raises SupersededError when the campaign's flights have changed
     since."""
@@ -83,9 +94,7 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
             hint="No action is needed: the landscape of the next proposal replaces it.",
         )
     return LandscapePlan(
-        definition=past.definition,
-        flights=past.flights,
-        donor=past.donor,
+        past,
         centre=_grid_centre(past, proposal),
         marks=(*(flight.gains for flight in past.flights), proposal.gains),
     )
@@ -93,7 +102,7 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
 
 def plan(order: LandscapePlan) -> LandscapeGrid | None:
     """Return the model and the grid, for a compute process; None without a model, or with fewer than two free gains."""
-    return plan_grid(order, experiment_of(order.definition))
+    return plan_grid(order.past.evidence, order.centre, order.marks)
 
 
 def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:

@@ -12,13 +12,12 @@ from typing import Final
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import experiment_of, space_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
-from app.campaigns.definitions import definition_of, frozen_digest
+from app.campaigns.definitions import definition_of, flown_evidence, frozen_digest
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
 from app.campaigns.schemas import ChoiceKind, Variant
-from app.campaigns.statistics import standing_within_bounds_of
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
 from app.core.definition import Definition, Flight
@@ -322,13 +321,13 @@ def _variants(
     campaign: CampaignRow, trials: Sequence[TrialRow], proposed: Gains | None
 ) -> dict[Variant, dict[str, float]]:
     """Every variant that there is; none before the first valid flight inside the bounds."""
-    now = standing_within_bounds_of(campaign, trials)
-    if now is None:
+    now = flown_evidence(campaign, trials).within_bounds
+    if not now.groups:
         return {}
     best = dict(now.winner.gains)
     found: dict[Variant, dict[str, float]] = {"repeat": best, "baseline": dict(now.baseline.gains)}
     if proposed is not None:
-        space = space_of(definition_of(campaign))
+        space = now.space
         target = space.vector(proposed)
         half = space.mapping(space.nearest((space.vector(best) + target) / 2.0))
         if half != best and not np.array_equal(space.vector(half), target):

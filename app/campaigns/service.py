@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import Permission, RequestContext
 from app.autopilots.registry import get_experiment
 from app.campaigns import history, repository
-from app.campaigns.definitions import check_campaign, fill_in_donor, stored
+from app.campaigns.definitions import check_campaign, fill_in_donor, flown_evidence, stored
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
 from app.campaigns.proposals import end_campaign, history_changed, reopen, request_proposal, safe_gains_changed
 from app.campaigns.rehearsals import rehearsal_of
@@ -32,7 +32,6 @@ from app.campaigns.schemas import (
     Sort,
     Start,
 )
-from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
@@ -325,8 +324,8 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     shared, not at rest, under another operator's control, or was changed meanwhile.
     """
     row = repository.get_campaign(session, campaign_id)
-    now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
-    if now is None or now.comparison is None:
+    now = flown_evidence(row, history.trials_of(session, campaign_id)).within_bounds
+    if now.comparison is None:
         raise ConflictError(
             "The best gains so far are the first flight's. Only gains that are shown to be better than these can "
             "become the safe gains.",

@@ -7,15 +7,16 @@ from pydantic import Field
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
-from app.campaigns.definitions import definition_of, experiment_of_campaign
+from app.campaigns.definitions import flown_evidence
 from app.campaigns.schemas import BestTrial
 from app.common.schemas import Gains, Schema
 from app.core.experiments.base import Experiment
 from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, signed
-from app.core.statistics.comparisons import Group, PooledScatter, Verdict, drift_of, optimism, pool_scatter, trend_of
+from app.core.statistics.comparisons import Verdict, drift_of, optimism, trend_of
 from app.core.tuning import predictions
-from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
-from app.db.models import CampaignRow, TrialRow, VehicleRow
+from app.core.tuning.confirmation import verdict_sentence
+from app.core.tuning.evidence import Evidence
+from app.db.models import TrialRow, VehicleRow
 from app.fleet import service as fleet
 
 _SURE: Final = 0.9
@@ -119,25 +120,21 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     """Statistics of a campaign. Raises NotFoundError."""
     row = repository.get_campaign(session, campaign_id)
     trials = history.trials_of(session, campaign_id)
-    definition, experiment = definition_of(row), experiment_of_campaign(row)
-    flights = history.flown_gains(trials)
-    now = compare_winner(definition, experiment, flights)
-    scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
+    now = flown_evidence(row, trials)
+    experiment, groups, scatter = now.experiment, now.groups, now.scatter
     expected = 0.0
-    if now is not None and scatter.reported is not None:
-        bias = optimism([group.mean for group in now.groups], [group.standard_error(scatter) for group in now.groups])
+    if groups and scatter.reported is not None:
+        bias = optimism([group.mean for group in groups], [group.standard_error(scatter) for group in groups])
         expected = bias if bias >= _LEAST_OPTIMISM else 0.0
-    record = predictions.track_record(flights)
-    drift = None if now is None or scatter.identical else _drift(experiment, now)
+    record = predictions.track_record(now.flights)
+    drift = None if scatter.identical else _drift(now)
     return CampaignStatistics(
         error_unit=experiment.error_unit,
-        confidence=definition.stop.confidence,
+        confidence=now.definition.stop.confidence,
         sigma=0.0 if scatter.identical else scatter.reported,
         degrees_of_freedom=scatter.degrees_of_freedom if scatter.known else 0.0,
-        scatter_source=_scatter_source(experiment, () if now is None else now.groups, scatter, row.vehicle),
-        groups=[]
-        if now is None
-        else [
+        scatter_source=_scatter_source(now, row.vehicle),
+        groups=[
             RepeatGroup.view_of(
                 group,
                 trial_numbers=group.numbers,
@@ -145,26 +142,22 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
                 is_baseline=group is now.baseline,
                 is_best=group is now.winner,
             )
-            for group in now.groups
+            for group in groups
         ],
-        comparison=None if now is None else _comparison(experiment, now),
+        comparison=_comparison(now),
         drift=drift,
-        battery_trend=None
-        if now is None
-        else _battery_trend(experiment, max(now.groups, key=lambda group: group.size), trials),
+        battery_trend=_battery_trend(now, trials),
         optimism=expected,
-        shrunk_error=None if now is None or scatter.reported is None else now.winner.mean + expected,
+        shrunk_error=now.winner.mean + expected if groups and scatter.reported is not None else None,
         track_record=TrackRecord.model_validate(record, from_attributes=True),
-        notes=[] if now is None else _notes(experiment, now, expected, drift, record),
+        notes=_notes(now, expected, drift, record) if groups else [],
     )
 
 
-def _scatter_source(
-    experiment: Experiment, groups: Sequence[Group], scatter: PooledScatter, vehicle: VehicleRow
-) -> str:
+def _scatter_source(now: Evidence[Experiment], vehicle: VehicleRow) -> str:
     """What the scatter of one flight was estimated from: repeats, prior, or both."""
-    prior, repeats = experiment.scatter, sum(group.size - 1 for group in groups)
-    estimate = f"prior estimate of {prior.sd:.3g} {experiment.error_unit}"
+    prior, scatter, repeats = now.experiment.scatter, now.scatter, sum(group.size - 1 for group in now.groups)
+    estimate = f"prior estimate of {prior.sd:.3g} {now.experiment.error_unit}"
     if not scatter.known:
         return "Not measured for this autopilot, and no gain set has two valid flights. Fly a gain set again."
     if scatter.identical:
@@ -181,20 +174,10 @@ def _scatter_source(
     return f"From {count(repeats, 'repeat')} and a {estimate} ({worth})."
 
 
-def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
-    """Groups, scatter and winner of a campaign; None before its first valid flight."""
-    return compare_winner(definition_of(row), experiment_of_campaign(row), history.flown_gains(trials))
-
-
-def standing_within_bounds_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
-    """Groups, scatter and winner among the gains that may be flown again; None before the first valid flight."""
-    return standing_within_bounds(definition_of(row), experiment_of_campaign(row), history.flown_gains(trials))
-
-
-def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestTrial | None:
+def best_trial(trials: Sequence[TrialRow], now: Evidence[Experiment]) -> BestTrial | None:
     """The valid trial with the lowest error and the mean of its gains."""
     best = history.best_of(trials)
-    if best is None or best.error is None or now is None:
+    if best is None:
         return None
     group = next(group for group in now.groups if best.number in group.numbers)
     return BestTrial.view_of(
@@ -207,7 +190,7 @@ def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestT
     )
 
 
-def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | None:
+def _comparison(now: Evidence[Experiment]) -> Comparison | None:
     comparison = now.comparison
     if comparison is None:
         return None
@@ -216,15 +199,15 @@ def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | No
         further=None
         if comparison.further is None
         else FlightsToDecide(best=comparison.further.first, baseline=comparison.further.second),
-        sentence=verdict_sentence(experiment, now),
+        sentence=verdict_sentence(now),
     )
 
 
-def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
+def _drift(now: Evidence[Experiment]) -> Drift | None:
     found = drift_of(now.groups, now.scatter)
     if found is None:
         return None
-    unit, is_resolved = experiment.error_unit, found.confidence >= _SURE
+    unit, is_resolved = now.experiment.error_unit, found.confidence >= _SURE
     amount = plus_minus(found.difference, found.standard_error, unit, sign="+")
     sentence = (
         f"{'The vehicle has drifted' if is_resolved else 'No drift resolved'}: from flight {found.first_number} to "
@@ -240,8 +223,11 @@ def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
     )
 
 
-def _battery_trend(experiment: Experiment, group: Group, trials: Sequence[TrialRow]) -> Trend | None:
+def _battery_trend(now: Evidence[Experiment], trials: Sequence[TrialRow]) -> Trend | None:
     """Slope of the error of the gains flown most often by battery voltage, where that was measured."""
+    if not now.groups:
+        return None
+    group = max(now.groups, key=lambda group: group.size)
     voltages = {row.number: row.landing_battery_v for row in trials}
     measured = [
         (volts, error)
@@ -251,7 +237,7 @@ def _battery_trend(experiment: Experiment, group: Group, trials: Sequence[TrialR
     found = trend_of([volts for volts, _ in measured], [error for _, error in measured], _SURE)
     if found is None:
         return None
-    unit = f"{experiment.error_unit} per V"
+    unit = f"{now.experiment.error_unit} per V"
     relation = "changes with" if found.is_resolved else "shows no dependence on"
     return Trend.view_of(
         found,
@@ -262,10 +248,10 @@ def _battery_trend(experiment: Experiment, group: Group, trials: Sequence[TrialR
 
 
 def _notes(
-    experiment: Experiment, now: ComparisonState, expected: float, drift: Drift | None, record: predictions.TrackRecord
+    now: Evidence[Experiment], expected: float, drift: Drift | None, record: predictions.TrackRecord
 ) -> list[str]:
-    unit = experiment.error_unit
-    notes = [verdict_sentence(experiment, now)]
+    unit = now.experiment.error_unit
+    notes = [verdict_sentence(now)]
     if expected > _NO_OPTIMISM * now.winner.standard_error(now.scatter):
         notes.append(
             f"The best of {len(now.groups)} gain sets ({format_gains(now.winner.gains)}) looks better than it is "

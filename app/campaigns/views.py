@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
+from app.campaigns.definitions import flown_evidence
 from app.campaigns.proposals import PROPOSAL_JOB, choices_of, is_stale
 from app.campaigns.rehearsals import is_rehearsal_satisfied, passed_rehearsals, rehearsal_of
 from app.campaigns.schemas import (
@@ -25,13 +26,14 @@ from app.campaigns.schemas import (
     TrialCounts,
     Winner,
 )
-from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
+from app.campaigns.statistics import best_trial
 from app.common.conflict_checks import allowed
 from app.common.schemas import Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
 from app.core.definition import aborted_by_gains
+from app.core.experiments.base import Experiment
 from app.core.statistics.comparisons import Verdict
-from app.core.tuning.confirmation import ComparisonState
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.proposals import Advice
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
@@ -58,8 +60,8 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     session.flush()
     trials = history.trials_of(session, row.id)
     flight = history.flight_under_way(session, row.id)
-    now = standing_of(row, trials)
-    repeatable = standing_within_bounds_of(row, trials)
+    now = flown_evidence(row, trials)
+    repeatable = now.within_bounds
     rehearsal = rehearsal_of(session, row)
     return Campaign.view_of(
         row,
@@ -68,13 +70,13 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         rehearses=repository.rehearsed_id(session, row.id),
         best=best_trial(trials, now),
         verdict=_verdict(now),
-        winner=None
-        if repeatable is None
-        else Winner(
+        winner=Winner(
             gains=dict(repeatable.winner.gains),
             trial_numbers=list(repeatable.winner.numbers),
             verdict=_verdict(repeatable),
-        ),
+        )
+        if repeatable.groups
+        else None,
         standing=_standing(row, repeatable),
         trials=_counts(trials),
         flying=None if flight is None else FlyingTrial(trial_id=flight.trial_id, trial_number=flight.trial.number),
@@ -99,14 +101,14 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
 def _summary(
     row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal, spark: list[SparkCurve], *, has_passed: bool
 ) -> CampaignSummary:
-    now = standing_of(row, trials)
-    best = [] if now is None else [trial for trial in trials if trial.number in now.winner.numbers]
+    now = flown_evidence(row, trials)
+    best = [trial for trial in trials if trial.number in now.winner.numbers] if now.groups else []
     return CampaignSummary.view_of(
         row,
         vehicle=fleet.campaign_vehicle(row),
         flights=_counts(trials).flown,
         best=best_trial(best, now),
-        first_error=None if now is None else now.baseline.mean,
+        first_error=now.baseline.mean if now.groups else None,
         verdict=_verdict(now),
         rehearsal=rehearsal.state,
         has_passed_as_rehearsal=has_passed,
@@ -191,18 +193,19 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
 
 def _present_gains(campaign: CampaignRow, trials: Sequence[TrialRow]) -> Mapping[str, float]:
     """The gains that a step starts from: the best within the bounds, else the best, else the vehicle's safe ones."""
-    if (within := standing_within_bounds_of(campaign, trials)) is not None:
+    within = flown_evidence(campaign, trials).within_bounds
+    if within.groups:
         return within.winner.gains
     best = history.best_of(trials)
     return campaign.vehicle.safe_gains if best is None else best.gains
 
 
-def _verdict(now: ComparisonState | None) -> Verdict | None:
-    return None if now is None or now.comparison is None else now.comparison.verdict
+def _verdict(now: Evidence[Experiment]) -> Verdict | None:
+    return None if now.comparison is None else now.comparison.verdict
 
 
-def _standing(row: CampaignRow, now: ComparisonState | None) -> Standing | None:
-    if row.outcome is None or now is None or now.comparison is None:
+def _standing(row: CampaignRow, now: Evidence[Experiment]) -> Standing | None:
+    if row.outcome is None or now.comparison is None:
         return None
     if not now.looks:
         return "candidate"

@@ -19,6 +19,7 @@ from app.core.formatting import count
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import uncorrected_model
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy, require_flyable
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.stop_rules import evaluate_stop_rule
@@ -138,12 +139,13 @@ def fly_campaign(title: str, published: tuple[Run, ...], fly: Callable[[Gains], 
     definition = CAMPAIGNS[title]
     flights: list[Flight] = []
     while True:
-        proposal = next_proposal(definition, _TAKEOFF, flights)
-        verdict = evaluate_stop_rule(definition, flights, proposal)
+        evidence = Evidence(definition=definition, experiment=_TAKEOFF, flights=flights)
+        proposal = next_proposal(evidence)
+        verdict = evaluate_stop_rule(evidence, proposal)
         if verdict.reason is not None:
             break
         gains, spread = proposal.gains, proposal.spread
-        require_flyable(check_policy(definition, _TAKEOFF, _TAKEOFF.space, gains, flights, start=gains, spread=spread))
+        require_flyable(check_policy(evidence, gains, start=gains, spread=spread))
         flights.append(_TAKEOFF.scored_flight(len(flights) + 1, gains, fly(gains).as_stored()))
     runs = runs_of((tuple(flight.gains.values()), flight.error or 0.0) for flight in flights)
     return Campaign(title, runs, published, verdict.reason)

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule, flight_seed
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.policy import Vector
@@ -222,9 +222,9 @@ def _flown(definition: Definition, method: Method, *, until_near: bool) -> Itera
     It ends when a flight is within 5 % of the optimum (with `until_near`), nothing is proposed, or the budget is used
     up.
     """
-    experiment, flights = experiment_of(definition), list[Flight]()
+    flights = list[Flight]()
     while len(flights) < definition.stop.max_flights:
-        proposal = next_proposal(definition, experiment, flights)
+        proposal = next_proposal(evidence_of(definition, flights))
         if proposal.kind == "none":
             return
         number = len(flights) + 1

@@ -19,6 +19,7 @@ from app.core.experiments.base import prior_distribution
 from app.core.formatting import percent
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.campaigns import CAMPAIGNS, Run, campaign_notes, fly_campaign, gains_text, runs_of, step_numbers
@@ -33,7 +34,8 @@ _CAMPAIGN: Final = Definition(experiment="takeoff", first_step_fraction=1.0)
 def judge_takeoff(gains: Gains) -> GateResult:
     """Check a takeoff's gains as before the first flight. Takes a tenth of a second."""
     experiment = get_experiment(_CAMPAIGN.experiment)
-    return check_policy(_CAMPAIGN, experiment, experiment.space, gains, (), spread=prior_distribution(experiment))
+    evidence = Evidence(definition=_CAMPAIGN, experiment=experiment, flights=())
+    return check_policy(evidence, gains, spread=prior_distribution(experiment))
 
 
 def overruled_for(gains: Gains, vehicle: str) -> str:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.core.analysis.margin import RINGING_DAMPING
 from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import TrajectoryError
@@ -152,14 +152,15 @@ def calibrated(tuning: StepsTuning) -> dict[str, object]:
             history.append(flight)
             if len(history) == CAMPAIGN_FLIGHTS:
                 break
-            proposal = next_proposal(definition, experiment_of(definition), history)
+            evidence = evidence_of(definition, history)
+            proposal = next_proposal(evidence)
         except TrajectoryError as refused:
             tuning.ended = str(refused)
             break
         if proposal.kind == "none":
             tuning.ended = "nothing better"
             break
-        gate = check_policy(definition, experiment, experiment.space, proposal.gains, history, spread=proposal.spread)
+        gate = check_policy(evidence, proposal.gains, spread=proposal.spread)
         if not gate.passed:
             tuning.ended = "refused"
             break

@@ -17,16 +17,16 @@ from unittest.mock import patch
 import numpy as np
 from scipy.optimize import minimize
 
-from app.autopilots.registry import EXPERIMENTS, experiment_of
+from app.autopilots.registry import EXPERIMENTS, evidence_of
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.corrected_model import start_gains
 from app.core.tuning.definition_checks import check_definition
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies import STRATEGIES, gradient
-from app.core.tuning.strategy import Evidence
 from bench.predictions import prediction_of
 from bench.targets.flying import EXPERIMENT, SPACE, Method, Tuning
 
@@ -195,15 +195,15 @@ def _as_published(*, scaled: bool, start: StartKind) -> Method:
 
     def run(tuning: Tuning) -> None:
         definition = _definition("gradient", {"scaled": scaled}, tuning, start)
-        history = [tuning.fly(SPACE.vector(start_gains(definition, EXPERIMENT, SPACE)))]
+        begun = Evidence(definition=definition, experiment=EXPERIMENT, flights=())
+        history = [tuning.fly(SPACE.vector(start_gains(begun)))]
         while True:
             with patch.multiple(
                 gradient,
                 allows=lambda *_: True,
-                known_distribution=lambda experiment, _: prior_distribution(experiment),
+                known_distribution=lambda known: prior_distribution(known.experiment),
             ):
-                known = Evidence(definition=definition, experiment=EXPERIMENT, flights=history)
-                proposal = STRATEGIES["gradient"].propose(known)
+                proposal = STRATEGIES["gradient"].propose(replace(begun, flights=history))
             if proposal.kind == "none":
                 tuning.settle(SPACE.vector(proposal.gains), "nothing better")
                 return
@@ -220,11 +220,12 @@ def _campaign(strategy: str, options: Mapping[str, OptionValue], start: StartKin
         definition = _definition(strategy, options, tuning, start)
         history: list[Flight] = []
         while True:
-            proposal = next_proposal(definition, experiment_of(definition), history)
+            evidence = evidence_of(definition, history)
+            proposal = next_proposal(evidence)
             if proposal.kind == "none":
                 tuning.settle(SPACE.vector(proposal.gains), "nothing better")
                 return
-            gate = check_policy(definition, EXPERIMENT, SPACE, proposal.gains, history)
+            gate = check_policy(evidence, proposal.gains)
             if not gate.passed:
                 tuning.ended = "refused: " + ", ".join(check.name for check in gate.checks if not check.passed)
                 return

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 from app.core.definition import Definition, Start
 from app.core.tuning.corrected_model import start_gains
-from bench.targets.flying import EXPERIMENT, SPACE
+from app.core.tuning.evidence import Evidence
+from bench.targets.flying import EXPERIMENT
 from bench.targets.methods import METHODS
 from bench.targets.report import AT_FLIGHTS, TARGETS, Outcome
 from bench.targets.results import Results
@@ -148,7 +149,7 @@ def own_lines(outcome: Outcome) -> list[str]:
 
 def page(all_found: Mapping[str, Mapping[str, Outcome]], results: Results, seed: int, figure: str) -> str:
     """Return the page in Markdown."""
-    start = start_gains(Definition(start=Start(kind="simplex")), EXPERIMENT, SPACE)
+    start = start_gains(Evidence(definition=Definition(start=Start(kind="simplex")), experiment=EXPERIMENT, flights=()))
     lines = [_INTRODUCTION.format(figure=figure, seed=seed, made=_made(results, seed), **start)]
     for population, found in all_found.items():
         lines += ["", f"## {TITLES[population]}", "", LINES[population]]

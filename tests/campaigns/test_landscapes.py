@@ -13,7 +13,6 @@ from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
 from app.processes.calls import ComputePool
 from tests.builders import WORKER, create_campaign, create_flown_campaign, create_flown_trial, get
-from tests.core.tuning.defined import plan_grid
 
 Json = dict[str, Any]
 
@@ -40,7 +39,7 @@ def run_landscapes(database: Database) -> int:
         assert campaign_id is not None
         with database.read() as session:
             plan = landscapes.read_plan(session, campaign_id, order)
-        survey = plan_grid(plan)
+        survey = landscapes.plan(plan)
         assert survey is not None
         landscape = survey.landscape(predict_points(survey.predict_errors, survey.points()))
         with database.write() as session:

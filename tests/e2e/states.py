@@ -42,7 +42,6 @@ from app.vehicles.base import FlightOptions
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
-from tests.core.tuning.defined import plan_grid
 
 T = TypeVar("T")
 Json = dict[str, Any]
@@ -160,7 +159,7 @@ class States:
         with self._database.read() as session:
             order: Json = {"name": f"campaign {campaign_id}", "proposal_id": _proposed(session, campaign_id).id}
             plan = landscapes.read_plan(session, campaign_id, order)
-        survey = plan_grid(plan)
+        survey = landscapes.plan(plan)
         assert survey is not None, "there is nothing to draw"
         found = survey.landscape(predict_points(survey.predict_errors, survey.points()))
 

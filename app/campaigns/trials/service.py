@@ -14,7 +14,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.autopilots.takeoffs import Takeoff
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
@@ -82,19 +82,14 @@ def gated_gains(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[
     """The gains, complete and in order, and the gate's result, whether or not they pass. Raises GainsError when they
     are not the campaign's gains."""
     definition = definition_of(campaign)
-    experiment = experiment_of(definition)
-    space = experiment.space.narrowed(definition.bounds)
-    gains = space.complete(asked)
-    flown = history.flights_of(session, campaign.id, recorded=())
-    searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
+    evidence = evidence_of(definition, history.flights_of(session, campaign.id, recorded=()))
+    gains = evidence.space.complete(asked)
+    searched = definition.start.kind == "simplex" and not evidence.valid
     gate = check_policy(
-        definition,
-        experiment,
-        space,
+        evidence,
         gains,
-        flown,
         start=proposals.stored_start(session, campaign) if searched else None,
-        spread=proposals.stored_distribution(session, campaign, experiment),
+        spread=proposals.stored_distribution(session, campaign, evidence.experiment),
     )
     return gains, gate
 

@@ -26,6 +26,7 @@ from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Box, Vector
 from app.core.tuning.calibration import Calibration, calibrate
 from app.core.tuning.copter_model import CopterModel
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.limited_model import LimitedModel
 from app.core.tuning.predictions import MODELS as PLAUSIBLE
 from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
@@ -232,11 +233,12 @@ FITTED: Final = (*CALIBRATED, CopterSteps)
 """Experiments whose model is fitted to flights."""
 
 
-def fit(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CampaignModel:
+def fit(evidence: Evidence[Experiment]) -> CampaignModel:
     """The model of these flights; at least one must be valid.
 
     Raises TypeError for an experiment whose model is not fitted, and TrajectoryError if a record does not suffice.
     """
+    experiment, flights = evidence.experiment, evidence.flights
     if isinstance(experiment, Takeoff):
         return TakeoffModel(experiment, flights)
     if isinstance(experiment, AltitudeSteps):
@@ -246,37 +248,34 @@ def fit(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CampaignMo
     raise TypeError(f"calibrated does not work with {experiment.name}")
 
 
-def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
+def known_distribution(evidence: Evidence[Experiment]) -> ParameterDistribution:
     """Distribution of the vehicle's parameters: the data sheet's until a flight is valid, then that of the fit.
 
     Experiments without a fit, and flights that do not suffice for one, use the data sheet; without a model the
     distribution is empty.
     """
-    if not isinstance(experiment, FITTED) or all(flight.error is None for flight in flights):
+    experiment = evidence.experiment
+    if not isinstance(experiment, FITTED) or all(flight.error is None for flight in evidence.flights):
         return prior_distribution(experiment)
     try:
-        return fit(experiment, flights).spread
+        return fit(evidence).spread
     except InputError:
         return prior_distribution(experiment)
 
 
-def as_flown(
-    experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight | None = None
-) -> ModelledExperiment:
-    """The experiment with the autopilot's parameters of the last flight that recorded any on which its model depends;
-    before the first of these, with those of the donor's flight, whose vehicle is of the same kind."""
-    all_flights = flights if donor is None else (donor, *flights)
-    recorded = [own for flight in all_flights if (own := experiment.loop_parameters(flight.parameters))]
+def as_flown(experiment: ModelledExperiment, flights: Sequence[Flight]) -> ModelledExperiment:
+    """The experiment with the autopilot's parameters of the last flight that recorded any on which its model
+    depends."""
+    recorded = [own for flight in flights if (own := experiment.loop_parameters(flight.parameters))]
     return experiment.under(recorded[-1]) if recorded else experiment
 
 
-def changed_parameters(experiment: ModelledExperiment, flights: Sequence[Flight]) -> str:
+def changed_parameters(evidence: Evidence[ModelledExperiment]) -> str:
     """A sentence that names the autopilot's parameters beside the gains that differ, in three digits, from those of the
     first valid flight that recorded them; empty if none do."""
+    experiment = evidence.experiment
     recorded = [
-        (flight.number, own)
-        for flight in flights
-        if flight.outcome == "valid" and (own := experiment.loop_parameters(flight.parameters))
+        (flight.number, own) for flight in evidence.valid if (own := experiment.loop_parameters(flight.parameters))
     ]
     if not recorded:
         return ""

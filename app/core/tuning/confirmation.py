@@ -7,24 +7,14 @@ for every repeated comparison. Gains outside the campaign's bounds, flown by ove
 again and are left out.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight, StopRule
 from app.core.experiments.base import Experiment
 from app.core.formatting import confidence_text, count, direction_of, format_gains, percent, plus_minus, short, times
-from app.core.statistics.comparisons import (
-    Comparison,
-    Group,
-    PooledScatter,
-    compare,
-    groups_of,
-    pool_scatter,
-    select_winner,
-    smallest_difference,
-)
+from app.core.statistics.comparisons import Comparison, smallest_difference
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import Proposal
 
 _NONE_BETTER: Final = MappingProxyType({0: "No other gains were flown.", 1: "The other gain set flown is not better."})
@@ -34,26 +24,10 @@ SCATTER_NOT_KNOWN: Final = (
     "the gain sets again."
 )
 
-NO_STEP: Final = "No further step is flown:"
+_NO_STEP: Final = "No further step is flown:"
 
 _CONFIRMATION_FLIGHTS: Final = 2
 """Flights reserved for repeating the winner and the baseline."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ComparisonState:
-    """Comparison of the flights so far; at least one is valid.
-
-    `baseline` is the group of the first valid flight, `winner` the best policy; `comparison` of the two is None while
-    they are the same. `looks` is the number of comparisons since both were repeated; 0 before.
-    """
-
-    groups: tuple[Group, ...]
-    scatter: PooledScatter
-    baseline: Group
-    winner: Group
-    looks: int
-    comparison: Comparison | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,88 +38,37 @@ class Confirmation:
     why: str
 
 
-def compare_winner(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> ComparisonState | None:
-    """Groups, scatter and winner of the flights; None before the first valid flight.
-
-    Under the stop rule `noise` the confidence allows for repeated comparisons; under the other rules, which do not
-    decide by it, only for the choice among the policies.
-    """
-    groups = groups_of(flights)
-    if not groups:
-        return None
-    scatter = pool_scatter(groups, experiment.scatter)
-    baseline, winner = groups[0], select_winner(groups, scatter)
-    looks = 0 if min(winner.size, baseline.size) < 2 else winner.size + baseline.size - 3
-    comparison = None
-    if winner is not baseline:
-        comparison = compare(
-            winner,
-            baseline,
-            scatter,
-            definition.stop.confidence,
-            candidates=len(groups) - 1,
-            looks=looks if definition.stop.kind == "noise" else 0,
-        )
-    return ComparisonState(
-        groups=groups, scatter=scatter, baseline=baseline, winner=winner, looks=looks, comparison=comparison
-    )
-
-
-def standing_within_bounds(
-    definition: Definition, experiment: Experiment, flights: Sequence[Flight]
-) -> ComparisonState | None:
-    """The comparison among gains inside the bounds, which may be flown again. None if there are none."""
-    return compare_winner(definition, experiment, _inside(definition, experiment, flights))
-
-
-def confirm(
-    definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
-) -> Confirmation:
+def confirm(evidence: Evidence[Experiment], proposal: Proposal) -> Confirmation:
     """Choose the next flight under the stop rule `noise`. At least one valid flight must lie inside the bounds.
 
     A proposal of kind `manual` predicts no improvement and counts as worth a flight until the flights run short.
     """
-    inside = _inside(definition, experiment, flights)
-    now = compare_winner(definition, experiment, inside)
-    assert now is not None
-    found = _Prospect(definition.stop, experiment, now, definition.stop.max_flights - len(flights), proposal).next()
-    return replace(found, why=f"{found.why} {_left_out(flights, inside)}".strip())
+    found = _prospect(evidence, proposal).next()
+    return replace(found, why=f"{found.why} {_left_out(evidence)}".strip())
 
 
-def _inside(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Sequence[Flight]:
-    space = experiment.space.narrowed(definition.bounds)
-    return [
-        flight
-        for flight in flights
-        if all(gain.refusal_by_bounds(flight.gains[gain.name]) is None for gain in space.gains)
-    ]
-
-
-def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:
-    within = {flight.number for flight in inside}
-    out = [str(flight.number) for flight in flights if flight.number not in within]
+def _left_out(evidence: Evidence[Experiment]) -> str:
+    within = {flight.number for flight in evidence.within_bounds.flights}
+    out = [str(flight.number) for flight in evidence.flights if flight.number not in within]
     if not out:
         return ""
     do = ("Flight", "lies", "is") if len(out) == 1 else ("Flights", "lie", "are")
     return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} not compared."
 
 
-def describe_step(
-    definition: Definition, experiment: Experiment, flights: Sequence[Flight], now: ComparisonState, proposal: Proposal
-) -> str:
+def describe_step(evidence: Evidence[Experiment], proposal: Proposal) -> str:
     """Predicted improvement of a step beside what the remaining flights, at least one, can distinguish from noise;
     empty for a `manual` proposal."""
-    step = _Prospect(definition.stop, experiment, now, definition.stop.max_flights - len(flights), proposal)
+    step = _prospect(evidence, proposal)
     return step.described if step.is_worth_a_flight else f"This step {step.lack}"
 
 
 @dataclass(frozen=True, slots=True)
 class _Prospect:
-    """A proposed step, beside what the flights that are `left` can distinguish from noise."""
+    """A proposed step, beside what the flights that are `left` can distinguish from noise; `now` is the evidence of the
+    gains inside the bounds."""
 
-    stop: StopRule
-    experiment: Experiment
-    now: ComparisonState
+    now: Evidence[Experiment]
     left: int
     proposal: Proposal
 
@@ -157,7 +80,9 @@ class _Prospect:
 
     @property
     def _resolvable(self) -> float:
-        return smallest_difference(self.now.scatter, self.now.winner.size, self.left, self.stop.confidence)
+        return smallest_difference(
+            self.now.scatter, self.now.winner.size, self.left, self.now.definition.stop.confidence
+        )
 
     @property
     def is_worth_a_flight(self) -> bool:
@@ -171,11 +96,11 @@ class _Prospect:
         `manual` proposal."""
         if self.proposal.kind == "manual":
             return ""
-        unit = self.experiment.error_unit
+        unit = self.now.experiment.error_unit
         return (
             f"The next step is predicted to reduce the error by {short(self._improvement)} {unit}, more than the "
             f"{short(self._resolvable)} {unit} that {count(self.left, 'flight')} can resolve at "
-            f"{percent(self.stop.confidence)} confidence."
+            f"{percent(self.now.definition.stop.confidence)} confidence."
         )
 
     @property
@@ -183,7 +108,7 @@ class _Prospect:
         """How little a step that is not worth a flight would gain, as the end of a sentence."""
         if self._improvement <= 0.0:
             return "is not predicted to reduce the error."
-        unit = self.experiment.error_unit
+        unit = self.now.experiment.error_unit
         return (
             f"would reduce the error by {short(self._improvement)} {unit}, less than the {short(self._resolvable)} "
             f"{unit} that {count(self.left, 'flight')} can resolve."
@@ -191,7 +116,7 @@ class _Prospect:
 
     @property
     def _why_none(self) -> str:
-        return f"{NO_STEP} {'the strategy proposes none.' if self.proposal.kind == 'none' else f'it {self.lack}'}"
+        return f"{_NO_STEP} {'the strategy proposes none.' if self.proposal.kind == 'none' else f'it {self.lack}'}"
 
     @property
     def _obstacle(self) -> str:
@@ -199,9 +124,9 @@ class _Prospect:
         if not self.is_worth_a_flight:
             return self._why_none
         if self.now.winner.size > 1:
-            return f"{NO_STEP} steps end with the first repeat of the best gains."
+            return f"{_NO_STEP} steps end with the first repeat of the best gains."
         if self.left <= _CONFIRMATION_FLIGHTS:
-            return f"{NO_STEP} the last {_CONFIRMATION_FLIGHTS} flights are reserved for the best and the first gains."
+            return f"{_NO_STEP} the last {_CONFIRMATION_FLIGHTS} flights are reserved for the best and the first gains."
         return ""
 
     def next(self) -> Confirmation:
@@ -210,7 +135,7 @@ class _Prospect:
         is_baseline = now.winner is now.baseline
         if left > 0 and (self.is_worth_a_flight if is_baseline else not self._obstacle):
             return Confirmation(phase="step", why=self.described)
-        sentence = verdict_sentence(self.experiment, now)
+        sentence = verdict_sentence(now)
         if is_baseline:
             tried = len(now.groups) - 1
             found = _NONE_BETTER.get(tried, f"None of the other {tried} gain sets flown is better.")
@@ -221,9 +146,13 @@ class _Prospect:
         return replace(again, why=f"{again.why} {self._obstacle}")
 
 
-def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
+def _prospect(evidence: Evidence[Experiment], proposal: Proposal) -> _Prospect:
+    return _Prospect(evidence.within_bounds, evidence.left, proposal)
+
+
+def verdict_sentence(now: Evidence[Experiment]) -> str:
     """The winner compared with the first gains, in a sentence."""
-    comparison, unit = now.comparison, experiment.error_unit
+    comparison, unit = now.comparison, now.experiment.error_unit
     if comparison is None:
         return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
     pair = f"{format_gains(now.winner.gains)} against the first flight's {format_gains(now.baseline.gains)}"
@@ -237,7 +166,7 @@ def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
     return f"{comparison.verdict.capitalize()} with {sure}: {found}."
 
 
-def _flown_again(now: ComparisonState, verdict: str) -> Confirmation:
+def _flown_again(now: Evidence[Experiment], verdict: str) -> Confirmation:
     comparison = now.comparison
     assert comparison is not None
     if now.looks and comparison.verdict != "unresolved":
@@ -252,7 +181,7 @@ def _flown_again(now: ComparisonState, verdict: str) -> Confirmation:
     return Confirmation(phase="baseline", why=f"{why}{_missing(comparison)}")
 
 
-def _only_once(now: ComparisonState) -> str:
+def _only_once(now: Evidence[Experiment]) -> str:
     """Why a difference that looks certain is flown again while no gains were repeated."""
     if any(group.size > 1 for group in now.groups):
         is_resolved = now.comparison is not None and now.comparison.verdict != "unresolved"

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight
+from app.core.definition import Flight
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, SimplexSearch
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
+from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.strategy import ModelPrediction
 
 if TYPE_CHECKING:
@@ -159,15 +160,15 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
     return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev), tuple(course))
 
 
-def start_gains(definition: Definition, experiment: Experiment, space: PolicySpace) -> dict[str, float]:
+def start_gains(evidence: Evidence[Experiment]) -> dict[str, float]:
     """Gains of the first flight: given ones, the nominal model's optimum, or the experiment's defaults.
 
     Given gains are those in the definition, its own or the best of another campaign. The optimum is searched from the
     default gains, if there is a model.
     """
-    modelled = experiment.modelled
-    if definition.start.gains is not None:
-        return space.check(definition.start.gains, field="start.gains")
-    if definition.start.kind == "simplex" and modelled is not None:
-        return space.mapping(model_optimum(modelled, space, space.nearest(space.default)).gains)
+    start, space = evidence.definition.start, evidence.space
+    if start.gains is not None:
+        return space.check(start.gains, field="start.gains")
+    if start.kind == "simplex" and has_model(evidence):
+        return space.mapping(model_optimum(evidence.experiment, space, space.nearest(space.default)).gains)
     return space.mapping(space.default)

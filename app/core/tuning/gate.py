@@ -7,21 +7,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.core.definition import Definition, Flight, was_flown
+from app.core.definition import was_flown
 from app.core.errors import GainsError, Problem
 from app.core.experiments.base import Check, Envelope, Experiment, ModelledExperiment, ParameterDistribution
 from app.core.formatting import percent
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.tuning.campaign_models import as_flown, known_distribution
 from app.core.tuning.corrected_model import start_gains
-from app.core.tuning.strategy import Evidence
+from app.core.tuning.evidence import Evidence, has_model
 
 
-def envelope_of(definition: Definition, experiment: Experiment) -> Envelope:
+def envelope_of(evidence: Evidence[Experiment]) -> Envelope:
     """The campaign's ceiling and safe gains: the vehicle's own, or else the experiment's default gains."""
-    own = definition.safe_gains
-    safe_gains = experiment.space.mapping(experiment.space.default) if own is None else own
-    return Envelope(ceiling_m=definition.ceiling_m, safe_gains=safe_gains)
+    own, space = evidence.definition.safe_gains, evidence.experiment.space
+    safe_gains = space.mapping(space.default) if own is None else own
+    return Envelope(ceiling_m=evidence.definition.ceiling_m, safe_gains=safe_gains)
 
 
 _LEAST_CHANGE: Final = 0.0005
@@ -114,27 +114,24 @@ class GateResult:
 
 
 def check_policy(
-    definition: Definition,
-    experiment: Experiment,
-    space: PolicySpace,
+    evidence: Evidence[Experiment],
     gains: Gains,
-    flights: Sequence[Flight],
     *,
     start: Gains | None = None,
     spread: ParameterDistribution | None = None,
 ) -> GateResult:
-    """Check a complete set of gains (every name of `space`).
+    """Check a complete set of gains.
 
     Checks the numbers, the campaign's bounds, its step limit, and the experiment's hazards if it has a model. Gains of
     a valid flight of this campaign may fly again even if simulated takeoffs exceed the altitude or diverge, because the
     flight is better evidence. The step of a gain outside its bounds is that to the bound. Pure; takes a tenth of a
     second for a takeoff.
 
-    `space` is the experiment's, narrowed to the campaign's bounds. Before the first valid flight a gain may change by
-    `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from any valid flight.
-    `start` gives the start gains if they are known, because the search on the model is slow. `spread` gives the
-    vehicle's parameter distribution, for `flights` without their records.
+    Before the first valid flight a gain may change by `first_step_fraction` of its range from the start gains,
+    afterwards by `step_fraction` from any valid flight. `start` gives the start gains if they are known, because the
+    search on the model is slow. `spread` gives the vehicle's parameter distribution, for flights without their records.
     """
+    definition, space, flights, valid = evidence.definition, evidence.space, evidence.flights, evidence.valid
     numbers = tuple(
         _refusal(NUMBERS, gain, gains, reason)
         for gain in space.gains
@@ -142,19 +139,17 @@ def check_policy(
     )
     if numbers:
         return GateResult(numbers)
-    valid, modelled = [flight for flight in flights if flight.outcome == "valid"], experiment.modelled
     hazards: tuple[Check, ...] = ()
-    if modelled is not None:
-        known = known_distribution(experiment, flights) if spread is None else spread
-        envelope = envelope_of(definition, experiment)
-        hazards = as_flown(modelled, flights).hazards(space.vector(gains), known, envelope)
+    if has_model(evidence):
+        known = known_distribution(evidence) if spread is None else spread
+        hazards = as_flown(evidence.experiment, flights).hazards(space.vector(gains), known, envelope_of(evidence))
     if was_flown(gains, valid):
         hazards = tuple(_flown_before(check) for check in hazards)
     if valid:
         flown = [flight.gains for flight in valid]
         step = check_step(space, gains, flown, definition.step_fraction, "the nearest flown set")
     else:
-        origin = start_gains(definition, experiment, space) if start is None else start
+        origin = start_gains(evidence) if start is None else start
         before = "the start gains before the first valid flight"
         step = check_step(space, gains, [origin], definition.first_step_fraction, before)
     return GateResult(jointly_offered(gains, (*check_bounds(space, gains), step, *hazards)))
@@ -213,5 +208,4 @@ def _hint(gate: GateResult, is_real: bool) -> str:
 
 def allows(evidence: Evidence[ModelledExperiment], gains: Vector, spread: ParameterDistribution) -> bool:
     """Whether gains of shape (n,) pass the experiment's hazard checks over the vehicle's parameter distribution."""
-    envelope = envelope_of(evidence.definition, evidence.experiment)
-    return all(check.passed for check in evidence.experiment.hazards(gains, spread, envelope))
+    return all(check.passed for check in evidence.experiment.hazards(gains, spread, envelope_of(evidence)))

@@ -10,7 +10,7 @@ flight). With more than three gains, those with the largest share of the gradien
 change of the error over one scale of the gain.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import isfinite
@@ -18,9 +18,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment, Matrix
 from app.core.policy import Gain, Gains, PolicySpace, Vector
+from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.proposals import model_of
 from app.core.tuning.transfer import informed_evidence
 
@@ -59,17 +59,6 @@ class Landscape:
     centre: dict[str, float]
     slices: tuple[Slice, ...]
     still: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LandscapePlan:
-    """What to compute: the gains through which the slices go (`centre`), and those they must contain (`marks`)."""
-
-    definition: Definition
-    flights: tuple[Flight, ...]
-    donor: Flight | None
-    centre: Gains
-    marks: tuple[Gains, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,24 +108,25 @@ class LandscapeGrid:
         )
 
 
-def plan_grid(plan: LandscapePlan, experiment: Experiment) -> LandscapeGrid | None:
-    """Return the model and the grid; None without a model, or with fewer than two free gains.
+def plan_grid(campaign: Evidence[Experiment], around: Gains, marks: Sequence[Gains]) -> LandscapeGrid | None:
+    """Return the model and the grid of slices through the gains `around`, which contain `marks`; None without a model,
+    or with fewer than two free gains.
 
     Pure; a calibration takes up to a second.
     """
-    space, modelled = experiment.space.narrowed(plan.definition.bounds), experiment.modelled
-    if modelled is None or free_gains(space) < 2:
+    space = campaign.space
+    if not has_model(campaign) or free_gains(space) < 2:
         return None
-    evidence, _ = informed_evidence(plan.definition, modelled, plan.flights, plan.donor)
-    predict_errors = model_of(evidence, plan.donor).errors
-    centre = space.nearest(space.vector(plan.centre))
-    marks = np.array([space.vector(gains) for gains in (*plan.marks, space.mapping(centre))])
+    evidence, _ = informed_evidence(campaign)
+    predict_errors = model_of(evidence).errors
+    centre = space.nearest(space.vector(around))
+    marked = np.array([space.vector(gains) for gains in (*marks, space.mapping(centre))])
     return LandscapeGrid(
         space=space,
         predict_errors=predict_errors,
         centre=centre,
         pairs=tuple(_pairs(space, centre, predict_errors)),
-        values=tuple(_values(gain, column) for gain, column in zip(space.gains, marks.T, strict=True)),
+        values=tuple(_values(gain, column) for gain, column in zip(space.gains, marked.T, strict=True)),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, StopRule, best_flight
+from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
@@ -20,6 +20,7 @@ from app.core.policy import Gains
 from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import predict_flight
 from app.core.tuning.proposals import next_proposal
@@ -103,15 +104,15 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
     )
     experiment = Takeoff(window_s=window_s)
     flights = [_flight(experiment, each) for each in used]
-    best = best_flight(flights)
-    calibration = calibrate(experiment, flights)
+    evidence = Evidence(definition=definition, experiment=experiment, flights=flights)
+    best, calibration = evidence.best, calibrate(experiment, flights)
     residual_m = float(np.sqrt(np.mean(calibration.residual**2)))
     _require_likeness(best, residual_m)
     spread = calibration.spread()
 
     def assess(name: str, gains: Gains) -> AssessedGains:
         predicted = predict_flight(calibration, best, experiment.space.vector(gains))
-        gate = check_policy(definition, experiment, experiment.space, gains, flights, spread=spread)
+        gate = check_policy(evidence, gains, spread=spread)
         errors = [flight.error for flight in flights if flight.error is not None and flight.gains == gains]
         return AssessedGains(
             name=name,
@@ -126,7 +127,7 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
     default = experiment.space.mapping(experiment.space.default)
     flown = [assess("As flown", gains) for gains in flown_sets]
     stock = [] if default in flown_sets else [assess("Paparazzi's default gains", default)]
-    proposed = assess("Proposed", next_proposal(definition, experiment, flights).gains)
+    proposed = assess("Proposed", next_proposal(evidence).gains)
     is_better = not proposed.refusal and (
         bool(flown[0].refusal) or proposed.predicted_error_m <= _BETTER * flown[0].predicted_error_m
     )

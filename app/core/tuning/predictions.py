@@ -29,12 +29,12 @@ from app.core.formatting import count
 from app.core.models.vertical import ENTERED
 from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
-from app.core.statistics.comparisons import Group, PooledScatter
+from app.core.statistics.comparisons import Group
 from app.core.tuning.calibration import Calibration
 from app.core.tuning.corrected_model import resample_to_grid
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import (
     CONFIDENCE,
-    Evidence,
     Explanation,
     Interval,
     Kind,
@@ -162,20 +162,15 @@ def with_interval(evidence: Evidence[ModelledExperiment], proposal: Proposal, *,
     )
 
 
-def repeat_proposal(
-    experiment: Experiment,
-    flights: Sequence[Flight],
-    group: Group,
-    scatter: PooledScatter,
-    kind: Kind,
-    why: Explanation,
-) -> Proposal:
+def repeat_proposal(evidence: Evidence[Experiment], group: Group, kind: Kind, why: Explanation) -> Proposal:
     """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval.
 
     Without a reported scatter there is no interval: it is unknown, or the repeats were identical to the last digit and
     contradict the prior.
     """
-    measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
+    experiment, scatter = evidence.experiment, evidence.scatter
+    flown = [flight for flight in evidence.flights if flight.number in group.numbers]
+    measured = np.array([resample_to_grid(experiment, flight) for flight in flown])
     curve = measured.mean(axis=0)
     bare = Proposal(
         kind=kind,

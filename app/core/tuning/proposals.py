@@ -2,31 +2,25 @@
 action that is recommended to the operator, and the prediction of a flight with any gains by the same model.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from app.core.definition import Definition, Flight, LogEvidence, aborted_by_gains
+from app.core.definition import Flight, LogEvidence, aborted_by_gains
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.formatting import count, format_gains, named_flights, short
+from app.core.formatting import format_gains, named_flights, short
 from app.core.policy import Gains
-from app.core.statistics.comparisons import Group, groups_of, pool_scatter
+from app.core.statistics.comparisons import Group
 from app.core.tuning.calibration import fitted_flights
 from app.core.tuning.campaign_models import FITTED, changed_parameters, known_distribution
-from app.core.tuning.confirmation import (
-    NO_STEP,
-    compare_winner,
-    confirm,
-    describe_step,
-    standing_within_bounds,
-)
+from app.core.tuning.confirmation import confirm, describe_step
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
+from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
 from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import propose as by_hand
-from app.core.tuning.strategy import Evidence, Explanation, Kind, Predictor, Proposal, proposal_of
+from app.core.tuning.strategy import Explanation, Kind, Predictor, Proposal, proposal_of
 from app.core.tuning.transfer import informed_evidence
 
 _ORIGIN = {
@@ -37,31 +31,23 @@ _ORIGIN = {
 }
 
 
-def next_proposal(
-    definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight | None = None
-) -> Proposal:
+def next_proposal(campaign: Evidence[Experiment]) -> Proposal:
     """Compute the next proposal. The same definition and flights give the same proposal, bit for bit on one machine.
 
-    `definition` must be free of problems (`app.core.tuning.definition_checks`), and `experiment` the one it names, as
-    configured there. `flights` are the valid and aborted
-    ones, in order; their trajectories are used as stored, in single precision. Without a valid flight the start gains
-    are proposed. `donor` is the flight named by `definition.start.donor`: required with start kind `campaign`, and not
-    allowed with others.
-
+    Trajectories are used as stored, in single precision. Without a valid flight the start gains are proposed.
     Every proposal that predicts an error has an interval and a band; without a model there is no prediction. Under the
     stop rule `noise` the proposal may repeat the winner or the first gains, or be of kind `none` once no further step
     can be distinguished from noise.
     """
-    modelled = experiment.modelled
-    if modelled is None:
-        return _manual_proposal(Evidence(definition=definition, experiment=experiment, flights=flights))
-    evidence, taken = informed_evidence(definition, modelled, flights, donor)
+    if not has_model(campaign):
+        return _manual_proposal(campaign)
+    evidence, taken = informed_evidence(campaign)
     if not evidence.valid:
-        return _start(evidence, donor)
-    strategy = STRATEGIES[definition.strategy]
+        return _start(evidence)
+    strategy = STRATEGIES[evidence.definition.strategy]
     proposal = strategy.propose(evidence)
     number = proposal.explanation.base_flight if strategy.corrects_model else None
-    base = next((flight for flight in flights if flight.number == number), None)
+    base = next((flight for flight in evidence.flights if flight.number == number), None)
     return _with_notes(_confirmed(evidence, with_interval(evidence, proposal, base=base)), evidence, taken)
 
 
@@ -69,7 +55,7 @@ def _manual_proposal(evidence: Evidence[Experiment]) -> Proposal:
     """Without a model: propose the start gains, then the operator's own; nothing is predicted."""
     if evidence.valid:
         return _confirmed(evidence, by_hand(evidence))
-    gains = start_gains(evidence.definition, evidence.experiment, evidence.space)
+    gains = start_gains(evidence)
     summary = (
         f"{_describe_start(evidence, gains)}; there is no model of this vehicle's controller, so there is no "
         "prediction."
@@ -78,10 +64,10 @@ def _manual_proposal(evidence: Evidence[Experiment]) -> Proposal:
     return proposal_of("start", gains, None, Explanation(summary=summary, lesson=lesson))
 
 
-def _start(evidence: Evidence[ModelledExperiment], donor: Flight | None) -> Proposal:
-    experiment, log = evidence.experiment, evidence.definition.start.log
-    gains = start_gains(evidence.definition, experiment, evidence.space)
-    predicted = model_of(evidence, donor).predict(evidence.space.vector(gains))
+def _start(evidence: Evidence[ModelledExperiment]) -> Proposal:
+    experiment, log, donor = evidence.experiment, evidence.definition.start.log, evidence.donor
+    gains = start_gains(evidence)
+    predicted = model_of(evidence).predict(evidence.space.vector(gains))
     uncorrected = "the nominal model" if log is None else "the model of the vehicle in that log"
     source = f"{uncorrected}, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     lesson = (
@@ -128,24 +114,23 @@ def _confirmed(evidence: Evidence[Experiment], proposal: Proposal) -> Proposal:
     The proposal is kept if a step is still worth a flight. Otherwise it is replaced by the flight that the confirmation
     requires, or by kind `none` if the gate refuses that flight.
     """
-    definition, experiment, flights = evidence.definition, evidence.experiment, evidence.flights
-    now = standing_within_bounds(definition, experiment, flights) if definition.stop.kind == "noise" else None
-    if now is None:
+    now = evidence.within_bounds
+    if evidence.definition.stop.kind != "noise" or not now.groups:
         return proposal
-    wanted = confirm(definition, experiment, flights, proposal)
+    wanted = confirm(evidence, proposal)
     if wanted.phase == "step":
         notes = (*proposal.explanation.notes, *filter(None, (wanted.why,)))
         return replace(proposal, explanation=replace(proposal.explanation, notes=notes))
-    spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
+    spread = known_distribution(evidence) if proposal.spread is None else proposal.spread
 
     def again(group: Group, kind: Kind, why: Explanation) -> Proposal:
         why = replace(why, fitted=proposal.explanation.fitted)
-        return replace(repeat_proposal(experiment, flights, group, now.scatter, kind, why), spread=spread)
+        return replace(repeat_proposal(now, group, kind, why), spread=spread)
 
     if wanted.phase == "decided":
         return again(now.winner, "none", Explanation(summary=wanted.why))
     group = now.winner if wanted.phase == "repeat" else now.baseline
-    gate = check_policy(definition, experiment, evidence.space, group.gains, flights, spread=spread)
+    gate = check_policy(evidence, group.gains, spread=spread)
     if not gate.passed:
         refused = (
             f"The best gains cannot be confirmed: {format_gains(group.gains)} cannot be flown again, because the gate "
@@ -161,7 +146,7 @@ def _with_notes(proposal: Proposal, evidence: Evidence[ModelledExperiment], take
     record = track_record(evidence.flights)
     further = (
         taken,
-        changed_parameters(evidence.experiment, evidence.flights),
+        changed_parameters(evidence),
         record.sentence if record.of or record.agreeing or record.disagreeing else "",
     )
     notes = (*proposal.explanation.notes, *filter(None, further))
@@ -182,42 +167,30 @@ class Advice:
     why: str
 
 
-def advise(
-    definition: Definition,
-    experiment: Experiment,
-    flights: Sequence[Flight],
-    proposal: Proposal,
-    verdict: StopVerdict,
-    *,
-    is_reopened: bool = False,
-) -> Advice:
+def advise(evidence: Evidence[Experiment], proposal: Proposal, verdict: StopVerdict) -> Advice:
     """Recommend the next action.
 
     Under the stop rule `noise` the proposal already contains the recommendation. Under the other rules it is the
     strategy's step until the rule stops, with a note where flights cannot distinguish its effect from noise. Without a
-    step, or in a campaign that `is_reopened` after its rule had stopped it, the advice is to confirm the best gains.
+    step, or in a campaign that was reopened after its rule had stopped it, the advice is to confirm the best gains.
     With any rule it is to stop once a flight was aborted because of the start gains, and none is valid. Only gains
     within the bounds are recommended, except when one of the other rules stops the campaign: that advice names the best
     of all flights.
     """
-    tells_noise = definition.stop.kind == "noise"
-    now = (compare_winner if verdict.stop and not tells_noise else standing_within_bounds)(
-        definition, experiment, flights
-    )
+    tells_noise = evidence.definition.stop.kind == "noise"
+    is_reopened = len(evidence.flights) < evidence.open_until_flight
+    now = evidence if verdict.stop and not tells_noise else evidence.within_bounds
     if verdict.stop:
-        return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=verdict.why)
-    if now is not None and proposal.kind == "none" and tells_noise:
-        budget = definition.stop.max_flights
-        ended = f"{NO_STEP} the budget of {count(budget, 'flight')} is used up. " if len(flights) >= budget else ""
+        return Advice(kind="stop", gains=dict(now.winner.gains) if now.groups else proposal.gains, why=verdict.why)
+    if now.groups and proposal.kind == "none" and tells_noise:
         shows = "Flying the best gains again shows whether their error stays the same."
-        why = f"{proposal.explanation.summary} {ended}{shows}"
-        return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
-    if now is None or tells_noise or not (proposal.kind == "none" or is_reopened):
-        is_refuted = proposal.kind == "start" and bool(aborted_by_gains(flights, proposal.gains))
+        return Advice(kind="repeat", gains=dict(now.winner.gains), why=f"{proposal.explanation.summary} {shows}")
+    if not now.groups or tells_noise or not (proposal.kind == "none" or is_reopened):
+        is_refuted = proposal.kind == "start" and bool(aborted_by_gains(evidence.flights, proposal.gains))
         kind = "stop" if is_refuted else _OTHER_KINDS.get(proposal.kind, "step")
-        effect = "" if now is None or tells_noise else describe_step(definition, experiment, flights, now, proposal)
+        effect = describe_step(evidence, proposal) if now.groups and not tells_noise else ""
         return Advice(kind=kind, gains=proposal.gains, why=effect or proposal.explanation.summary)
-    confirmation = confirm(definition, experiment, flights, proposal)
+    confirmation = confirm(evidence, proposal)
     kind = "stop" if confirmation.phase == "decided" else confirmation.phase
     chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}
     return Advice(kind=kind, gains=dict(chosen.get(kind, now.winner.gains)), why=confirmation.why)
@@ -243,44 +216,38 @@ class FlightPredictor:
         return with_interval(self.evidence, proposal_of("manual", gains, predicted, _UNEXPLAINED), base=self.base)
 
 
-def flight_predictor(
-    definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight | None = None
-) -> FlightPredictor | None:
+def flight_predictor(campaign: Evidence[Experiment]) -> FlightPredictor | None:
     """The predictor after these flights, with the model that `next_proposal` uses for them; None without a model.
 
     A fit takes up to half a second; a prediction some milliseconds, or a tenth of a second under ArduCopter.
     """
-    modelled = experiment.modelled
-    if modelled is None:
+    if not has_model(campaign):
         return None
-    evidence, _ = informed_evidence(definition, modelled, flights, donor)
-    is_corrected = bool(evidence.valid) and STRATEGIES[definition.strategy].corrects_model
+    evidence, _ = informed_evidence(campaign)
+    is_corrected = bool(evidence.valid) and STRATEGIES[evidence.definition.strategy].corrects_model
     base = evidence.best if is_corrected else None
-    return FlightPredictor(evidence=evidence, model=model_of(evidence, donor), base=base)
+    return FlightPredictor(evidence=evidence, model=model_of(evidence), base=base)
 
 
-def model_of(evidence: Evidence[ModelledExperiment], donor: Flight | None) -> Predictor:
+def model_of(evidence: Evidence[ModelledExperiment]) -> Predictor:
     """The strategy's model; before the first valid flight the nominal one, or the one corrected by the donor's."""
     if evidence.valid:
         return STRATEGIES[evidence.definition.strategy].model(evidence)
-    return uncorrected_model(evidence.experiment) if donor is None else correct_by_bias(evidence.experiment, donor)
+    experiment, donor = evidence.experiment, evidence.donor
+    return uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
 
 
-def modelled_flights(experiment: Experiment, flights: Sequence[Flight]) -> frozenset[int]:
+def modelled_flights(evidence: Evidence[Experiment]) -> frozenset[int]:
     """Numbers of the flights whose records `flight_predictor` needs."""
-    valid = [flight for flight in flights if flight.outcome == "valid"]
-    used = fitted_flights(flights) if valid and isinstance(experiment, FITTED) else valid
+    valid = evidence.valid
+    used = fitted_flights(valid) if valid and isinstance(evidence.experiment, FITTED) else valid
     return frozenset(flight.number for flight in (*valid[:1], *used))
 
 
-def predict_repeat(experiment: Experiment, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
+def predict_repeat(evidence: Evidence[Experiment], gains: Gains) -> Proposal | None:
     """Predict another flight of gains that were flown: the mean of their flights; None if no valid flight had them.
 
     Only the flights with these gains need their records.
     """
-    groups = groups_of(flights)
-    group = next((each for each in groups if each.gains == gains), None)
-    if group is None:
-        return None
-    scatter = pool_scatter(groups, experiment.scatter)
-    return repeat_proposal(experiment, flights, group, scatter, "repeat", _UNEXPLAINED)
+    group = next((each for each in evidence.groups if each.gains == gains), None)
+    return None if group is None else repeat_proposal(evidence, group, "repeat", _UNEXPLAINED)

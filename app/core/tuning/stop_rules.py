@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight, StopRule, aborted_by_gains
+from app.core.definition import Flight, StopRule, aborted_by_gains
+from app.core.experiments.base import Experiment
 from app.core.formatting import count, format_gains, named_flights, percent
 from app.core.records.trajectory import Trajectory
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import Kind, Proposal
 
 Reason = Literal["aborted again", "not improving", "flight budget", "nothing better", "told from noise", "battery low"]
@@ -37,22 +39,18 @@ class StopVerdict:
 
 
 def evaluate_stop_rule(
-    definition: Definition,
-    flights: Sequence[Flight],
-    proposal: Proposal,
-    *,
-    battery_v: float | None = None,
-    open_until_flight: int = 0,
+    evidence: Evidence[Experiment], proposal: Proposal, *, battery_v: float | None = None
 ) -> StopVerdict:
     """Apply the campaign's stop rule to its flights and the proposal computed from them.
 
     With any rule, gains are not proposed once more after `ABORTS_ALLOWED` flights were aborted because of them. Flights
     that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is the
-    voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights no
-    rule ends the campaign, because it was reopened for them; a low battery is still reported.
+    voltage, V, at which the last flight ended, whether or not that flight counts. In a reopened campaign a low battery
+    is still reported.
     """
+    flights, open_until_flight = evidence.flights, evidence.open_until_flight
     verdict = decide_stop(
-        definition.stop,
+        evidence.definition.stop,
         [None if _is_repeat(flights, place) else flight.error for place, flight in enumerate(flights)],
         proposal.kind,
         battery_v=battery_v,

@@ -1,54 +1,14 @@
-"""Interface of a strategy: a pure function of the evidence, which is a campaign's definition, its experiment and its
-flights."""
+"""Interface of a strategy, a pure function of the evidence, and what it returns: a proposal with its prediction."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Final, Generic, Literal, Protocol, TypeVar
+from typing import Final, Literal, Protocol
 
-from app.core.definition import Definition, Flight, Option, best_flight
+from app.core.definition import Option
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
-from app.core.policy import Gains, PolicySpace, Vector
+from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
-from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
-
-_E_co = TypeVar("_E_co", bound=Experiment, covariant=True)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Evidence(Generic[_E_co]):
-    """`experiment` is the one that the definition names, as configured there; `flights` are the valid and aborted ones,
-    in order."""
-
-    definition: Definition
-    experiment: _E_co
-    flights: Sequence[Flight]
-
-    @cached_property
-    def space(self) -> PolicySpace:
-        """The gains within the campaign's bounds."""
-        return self.experiment.space.narrowed(self.definition.bounds)
-
-    @cached_property
-    def valid(self) -> Sequence[Flight]:
-        """The flights that count, in order."""
-        return [flight for flight in self.flights if flight.outcome == "valid"]
-
-    @property
-    def best(self) -> Flight:
-        """The valid flight with the lowest error, the earliest of equals; at least one flight must be valid."""
-        return best_flight(self.flights)
-
-    @cached_property
-    def groups(self) -> tuple[Group, ...]:
-        """The valid flights by their gains."""
-        return groups_of(self.flights)
-
-    @cached_property
-    def scatter(self) -> PooledScatter:
-        """The scatter of the groups, with the experiment's prior."""
-        return pool_scatter(self.groups, self.experiment.scatter)
-
+from app.core.tuning.evidence import Evidence
 
 CONFIDENCE: Final = 0.9
 """Probability with which a predicted interval contains the error of a flight."""

@@ -11,21 +11,20 @@ A's fitted model replaces the data sheet, with standard deviations that grow as 
 is shortened to that share.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight
+from app.core.definition import Flight
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import percent
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.campaign_models import CALIBRATED, as_flown
 from app.core.tuning.corrected_model import correct_by_bias
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.predictions import offset_sensitivity
-from app.core.tuning.strategy import Evidence
 
 LEAST_AGREEMENT: Final = 0.5
 _TAKEN: Final = {
@@ -38,8 +37,8 @@ _TAKEN: Final = {
 class Transfer:
     """Result of a transfer.
 
-    `agreement` is None until this vehicle has flown; `experiment` and `step_fraction` are those the strategy has to
-    use.
+    `agreement` is None without a donor, and until this vehicle has flown; `experiment` and `step_fraction` are those
+    the strategy has to use.
     """
 
     experiment: ModelledExperiment
@@ -48,27 +47,22 @@ class Transfer:
     sentence: str
 
 
-def informed_evidence(
-    definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight | None
-) -> tuple[Evidence[ModelledExperiment], str]:
-    """The evidence of the flights, with the model and the step limit that follow from the donor's flight and with the
-    autopilot's parameters as flown; and a sentence about the transfer, empty if there is none."""
-    sentence = ""
-    if donor is not None:
-        warm = transfer(definition, experiment, flights, donor)
-        experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
-        sentence = warm.sentence
-    modelled = as_flown(experiment, flights, donor)
-    return Evidence(definition=definition, experiment=modelled, flights=flights), sentence
+def informed_evidence(plain: Evidence[ModelledExperiment]) -> tuple[Evidence[ModelledExperiment], str]:
+    """The evidence with the model and the step limit that follow from the donor's flight and with the autopilot's
+    parameters as flown, before the first own flight those of the donor's, whose vehicle is of the same kind; and a
+    sentence about the transfer, empty if there is none."""
+    warm = transfer(plain)
+    flown = plain.flights if plain.donor is None else (plain.donor, *plain.flights)
+    definition = replace(plain.definition, step_fraction=warm.step_fraction)
+    experiment = as_flown(warm.experiment, flown)
+    return replace(plain, definition=definition, experiment=experiment, plain=plain), warm.sentence
 
 
-def transfer(
-    definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight
-) -> Transfer:
+def transfer(evidence: Evidence[ModelledExperiment]) -> Transfer:
     """Compute the transfer from the first valid flight, for the whole campaign; only the next step is shortened."""
-    valid = [flight for flight in flights if flight.outcome == "valid"]
+    definition, experiment, valid, donor = evidence.definition, evidence.experiment, evidence.valid, evidence.donor
     plain = Transfer(experiment=experiment, step_fraction=definition.step_fraction, agreement=None, sentence="")
-    if not valid:
+    if donor is None or not valid:
         return plain
     agreed, apart, own = _agreement(experiment, donor, valid[0])
     unit = CHANNEL_UNITS.get(experiment.output, "")

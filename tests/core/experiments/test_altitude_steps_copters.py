@@ -16,7 +16,7 @@ from app.core.experiments.copter_steps import CopterSteps
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.gate import check_policy
-from tests.core.tuning.defined import problems_of
+from tests.core.tuning.defined import evidence, problems_of
 from tests.core.tuning.flying import compiled_only
 
 NAMES: Final = ("altitude-steps-ardupilot", "altitude-steps-px4")
@@ -185,7 +185,7 @@ def test_the_gate_names_the_parameter_with_which_the_model_does_not_hold(
 ) -> None:
     """Also after a later flight whose record has settings of the link alone."""
     flights = [_flight(steps, 1, parameters), _flight(steps, 2, {"telemetry_hz": 50.0})]
-    gate = check_policy(Definition(experiment=steps.name), steps, steps.space, flights[0].gains, flights)
+    gate = check_policy(evidence(Definition(experiment=steps.name), steps, flights), flights[0].gains)
     assert [(check.name, sentence in check.sentence) for check in gate.refusals] == [("parameters", True)]
 
 

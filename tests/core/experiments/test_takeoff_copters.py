@@ -18,7 +18,7 @@ from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
-from tests.core.tuning.defined import check_definition, next_proposal, problems_of
+from tests.core.tuning.defined import check_definition, evidence, next_proposal, problems_of
 
 PX4 = get_experiment("takeoff-px4")
 BY_HAND: Final = Definition(experiment="takeoff-px4", strategy="manual", stop=StopRule(kind="budget", max_flights=5))
@@ -125,7 +125,8 @@ def test_a_campaign_by_hand_proposes_the_start_and_then_the_best_flown_and_predi
     then = next_proposal(BY_HAND, FLOWN)
     assert said(then) == ("manual", FIRMER)
     assert "The best gains so far are those of flight 2" in then.explanation.summary
-    assert advise(BY_HAND, PX4, FLOWN, then, evaluate_stop_rule(BY_HAND, FLOWN, then)).kind == "step"
+    known = evidence(BY_HAND, PX4, FLOWN)
+    assert advise(known, then, evaluate_stop_rule(known, then)).kind == "step"
 
 
 def test_a_warm_start_takes_the_others_gains_and_nothing_else() -> None:
@@ -155,7 +156,7 @@ def test_once_a_set_was_flown_twice_its_own_repeats_say_what_to_expect_of_a_thir
 
 def refusals(gains: Gains, flights: Sequence[Flight] = ()) -> list[tuple[str, str]]:
     definition = replace(BY_HAND, step_fraction=0.25)
-    gate = check_policy(definition, PX4, PX4.space, gains, flights)
+    gate = check_policy(evidence(definition, PX4, flights), gains)
     assert {check.name for check in gate.checks} <= {"numbers", "bounds", "step"}
     return [(check.name, check.gain) for check in gate.refusals]
 
@@ -169,5 +170,5 @@ def test_the_gate_holds_gains_to_bounds_and_steps_and_simulates_nothing() -> Non
 
 
 def test_of_a_vehicle_without_a_model_nothing_is_known_however_often_it_flew() -> None:
-    assert known_distribution(PX4, FLOWN).mean == ()
-    assert known_distribution(PX4, ()).origin == "none: there is no model"
+    assert known_distribution(evidence(Definition(), PX4, FLOWN)).mean == ()
+    assert known_distribution(evidence(Definition(), PX4, ())).origin == "none: there is no model"

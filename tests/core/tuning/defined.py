@@ -2,38 +2,37 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
-from app.autopilots.registry import EXPERIMENTS, experiment_of
+from app.autopilots.registry import EXPERIMENTS, evidence_of
 from app.core.definition import Definition, Flight
 from app.core.errors import Problem
-from app.core.experiments.base import ModelledExperiment
+from app.core.experiments.base import Experiment
 from app.core.policy import Gains, PolicySpace
-from app.core.tuning import definition_checks, landscape, proposals
-from app.core.tuning.landscape import LandscapeGrid, LandscapePlan
+from app.core.tuning import definition_checks, proposals
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.proposals import FlightPredictor
-from app.core.tuning.strategy import Evidence, Proposal
+from app.core.tuning.strategy import Proposal
+
+_E = TypeVar("_E", bound=Experiment)
 
 
 def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flight | None = None) -> Proposal:
-    return proposals.next_proposal(definition, experiment_of(definition), flights, donor)
+    return proposals.next_proposal(evidence_of(definition, flights, donor=donor))
 
 
 def fitted_predictor(
     definition: Definition, flights: Sequence[Flight], donor: Flight | None = None
 ) -> FlightPredictor | None:
-    return proposals.flight_predictor(definition, experiment_of(definition), flights, donor)
+    return proposals.flight_predictor(evidence_of(definition, flights, donor=donor))
 
 
 def predict_repeat(definition: Definition, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
-    return proposals.predict_repeat(experiment_of(definition), flights, gains)
+    return proposals.predict_repeat(evidence_of(definition, flights), gains)
 
 
 def modelled_flights(definition: Definition, flights: Sequence[Flight]) -> frozenset[int]:
-    return proposals.modelled_flights(experiment_of(definition), flights)
-
-
-def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
-    return landscape.plan_grid(plan, experiment_of(plan.definition))
+    return proposals.modelled_flights(evidence_of(definition, flights))
 
 
 def problems_of(definition: Definition) -> tuple[Problem, ...]:
@@ -45,8 +44,20 @@ def check_definition(definition: Definition) -> None:
 
 
 def evidence(
-    definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], space: PolicySpace | None = None
-) -> Evidence[ModelledExperiment]:
+    definition: Definition,
+    experiment: _E,
+    flights: Sequence[Flight],
+    space: PolicySpace | None = None,
+    *,
+    donor: Flight | None = None,
+    open_until_flight: int = 0,
+) -> Evidence[_E]:
     """Of these flights, within the bounds of `space` if it is given."""
     bounds = definition.bounds if space is None else {gain.name: (gain.lower, gain.upper) for gain in space.gains}
-    return Evidence(definition=replace(definition, bounds=bounds), experiment=experiment, flights=flights)
+    return Evidence(
+        definition=replace(definition, bounds=bounds),
+        experiment=experiment,
+        flights=flights,
+        donor=donor,
+        open_until_flight=open_until_flight,
+    )

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.definition import Flight
+from app.core.definition import Definition, Flight
 from app.core.experiments.base import prior_distribution
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import MAX_FLIGHTS, calibrate
 from app.core.tuning.campaign_models import known_distribution
+from tests.core.tuning.defined import evidence
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
 
 pytestmark = compiled_only
@@ -111,10 +112,14 @@ def test_fitted_parameters_come_with_their_standard_errors_and_what_was_known() 
 
 def test_before_a_flight_the_data_sheet_is_what_is_known_afterwards_the_fit() -> None:
     aborted = replace(fly(1, DEFAULT), outcome="aborted", error=None)
-    assert known_distribution(TAKEOFF, []) == known_distribution(TAKEOFF, [aborted]) == prior_distribution(TAKEOFF)
-    assert known_distribution(PitchTracking(), []) == prior_distribution(PitchTracking())
+    assert (
+        known_distribution(evidence(Definition(), TAKEOFF, []))
+        == known_distribution(evidence(Definition(), TAKEOFF, [aborted]))
+        == prior_distribution(TAKEOFF)
+    )
+    assert known_distribution(evidence(Definition(), PitchTracking(), [])) == prior_distribution(PitchTracking())
     flight = gusty(fly(2, DEFAULT), 7)
-    spread = known_distribution(TAKEOFF, [aborted, flight])
+    spread = known_distribution(evidence(Definition(), TAKEOFF, [aborted, flight]))
     assert spread.origin == "the calibration on 1 flight"
     assert spread.mean[0] == pytest.approx(0.61, abs=0.01)
     floor = 0.05 * TAKEOFF.model_parameters[0].prior_sd

@@ -1,5 +1,6 @@
 """Telling the winner from luck: the rule `noise`, and advice under the other rules."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -7,11 +8,14 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, Flight, StopRule
-from app.core.tuning.confirmation import compare_winner, confirm, standing_within_bounds, verdict_sentence
-from app.core.tuning.proposals import advise
+from app.core.experiments.base import Experiment
+from app.core.tuning.confirmation import confirm, verdict_sentence
+from app.core.tuning.evidence import Evidence
+from app.core.tuning.proposals import Advice, advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategy import Explanation, Kind, Proposal
 from tests.core.tuning.bowl import QuadraticExperiment, fly
+from tests.core.tuning.defined import evidence
 
 NOISE = Definition(stop=StopRule(kind="noise", max_flights=12))
 PAPER = Definition(stop=StopRule(kind="paper", max_flights=12))
@@ -42,22 +46,30 @@ def proposed(kind: Kind = "step", error: float | None = 0.1, a: float = 99.0) ->
     )
 
 
+def known(definition: Definition, flights: Sequence[Flight], open_until_flight: int = 0) -> Evidence[Experiment]:
+    return evidence(definition, QuadraticExperiment(), flights, open_until_flight=open_until_flight)
+
+
+def advised(evidence: Evidence[Experiment], proposal: Proposal) -> Advice:
+    return advise(evidence, proposal, evaluate_stop_rule(evidence, proposal))
+
+
 def phase(flights: list[Flight], proposal: Proposal, definition: Definition = NOISE) -> str:
-    return confirm(definition, QuadraticExperiment(), flights, proposal).phase
+    return confirm(known(definition, flights), proposal).phase
 
 
 def test_a_step_with_a_resolvable_improvement_is_flown() -> None:
-    found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.3))
+    found = confirm(known(NOISE, flown((1, 0.5))), proposed(error=0.3))
     assert found.phase == "step"
     assert "is predicted to reduce the error by 0.200 m, more than the 0.0078 m that 11 flights" in found.why
 
 
 def test_a_step_without_a_resolvable_improvement_ends_a_campaign_without_a_winner() -> None:
-    found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.499))
+    found = confirm(known(NOISE, flown((1, 0.5))), proposed(error=0.499))
     assert found.phase == "decided"
     assert "would reduce the error by 0.0010 m, less than the 0.0078 m that 11 flights" in found.why
     assert "No other gains were flown." in found.why
-    tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
+    tried = confirm(known(NOISE, flown((1, 0.5), (2, 0.6))), proposed("none", 0.5))
     assert tried.phase == "decided"
     assert "The other gain set flown is not better. No further step is flown: the strategy proposes none." in tried.why
 
@@ -68,7 +80,7 @@ def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided
     flights = flown((1, 0.5), (2, 0.2), (2, 0.21))
     assert phase(flights, proposed(error=0.0)) == "baseline"
     flights = flown((1, 0.5), (2, 0.2), (2, 0.21), (1, 0.49))
-    found = confirm(NOISE, QuadraticExperiment(), flights, proposed(error=0.0))
+    found = confirm(known(NOISE, flights), proposed(error=0.0))
     assert found.phase == "decided"
     assert found.why.startswith(
         "Better with more than 99.9\u00a0% confidence: a 2, b 40 against the first flight's a 1, b 40"
@@ -77,7 +89,7 @@ def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided
 
 def test_an_undecided_comparison_continues_until_the_budget_ends_and_states_what_would_decide() -> None:
     runs = [(1, 0.200), (2, 0.195), (2, 0.197), (1, 0.199)]
-    found = confirm(NOISE, QuadraticExperiment(), flown(*runs), proposed("none"))
+    found = confirm(known(NOISE, flown(*runs)), proposed("none"))
     assert found.phase == "repeat"
     assert "Unresolved" in found.why
     assert "would not resolve it" in found.why
@@ -112,36 +124,28 @@ def test_only_gains_inside_the_bounds_are_confirmed(
     """Those outside were flown over a refusal and would be refused again."""
     definition = replace(NOISE, bounds={"a": bounds})
     flights = flown((1, 0.5), (2, 0.4), (3, 0.2), (4, 0.3))
-    now = standing_within_bounds(definition, QuadraticExperiment(), flights)
-    assert now is not None
+    now = known(definition, flights).within_bounds
     assert (now.winner.gains["a"], now.baseline.gains["a"]) == (winner, baseline)
-    why = confirm(definition, QuadraticExperiment(), flights, proposed("none", 0.2)).why
+    why = confirm(known(definition, flights), proposed("none", 0.2)).why
     assert why.endswith(left_out)
     assert ("outside the bounds" in why) == bool(left_out)
 
 
 def test_with_every_flight_outside_the_bounds_nothing_is_confirmed() -> None:
     definition = replace(NOISE, bounds={"a": (50.0, 100.0)})
-    assert standing_within_bounds(definition, QuadraticExperiment(), flown((1, 0.5), (2, 0.2))) is None
-    advice = advise(
-        definition,
-        QuadraticExperiment(),
-        flown((1, 0.5)),
-        proposed(),
-        evaluate_stop_rule(definition, flown((1, 0.5)), proposed()),
-    )
+    assert known(definition, flown((1, 0.5), (2, 0.2))).within_bounds.groups == ()
+    advice = advised(known(definition, flown((1, 0.5))), proposed())
     assert (advice.kind, advice.gains["a"]) == ("step", 99.0)
 
 
 def test_a_difference_that_nothing_would_decide_is_said_to_be_one() -> None:
-    now = compare_winner(NOISE, QuadraticExperiment(), flown((1, 0.2), (2, 0.2), (2, 0.1999999)))
-    assert now is not None
+    now = known(NOISE, flown((1, 0.2), (2, 0.2), (2, 0.1999999)))
     assert now.comparison is not None
-    assert "Even 100 more flights would not resolve it" in verdict_sentence(QuadraticExperiment(), now)
+    assert "Even 100 more flights would not resolve it" in verdict_sentence(now)
 
 
 def test_before_the_first_flight_nothing_stands() -> None:
-    assert compare_winner(NOISE, QuadraticExperiment(), []) is None
+    assert known(NOISE, []).comparison is None
 
 
 @pytest.mark.complete
@@ -153,12 +157,11 @@ def test_equal_policies_are_rarely_called_better() -> None:
     for _ in range(400):
         runs = [(float(a), 0.2 + SIGMA * rng.standard_normal()) for a in range(4)]
         while (now := phase(flown(*runs), proposed("none"))) in {"repeat", "baseline"}:
-            found = compare_winner(NOISE, QuadraticExperiment(), flown(*runs))
-            assert found is not None
+            found = known(NOISE, flown(*runs))
             again = found.winner if now == "repeat" else found.baseline
             runs.append((again.gains["a"], 0.2 + SIGMA * rng.standard_normal()))
-        last = compare_winner(NOISE, QuadraticExperiment(), flown(*runs))
-        better += last is not None and last.comparison is not None and last.comparison.verdict == "better"
+        last = known(NOISE, flown(*runs))
+        better += last.comparison is not None and last.comparison.verdict == "better"
     assert better / 400 <= 0.1
 
 
@@ -170,8 +173,8 @@ def test_a_real_improvement_of_five_standard_deviations_is_nearly_always_found()
         while (now := phase(flown(*runs), proposed("none"))) in {"repeat", "baseline"}:
             a, true = (1.0, 0.15) if now == "repeat" else (0.0, 0.2)
             runs.append((a, true + SIGMA * rng.standard_normal()))
-        last = compare_winner(NOISE, QuadraticExperiment(), flown(*runs))
-        better += last is not None and last.comparison is not None and last.comparison.verdict == "better"
+        last = known(NOISE, flown(*runs))
+        better += last.comparison is not None and last.comparison.verdict == "better"
         flights += len(runs)
     assert better / 200 >= 0.97
     assert flights / 200 <= 5.0
@@ -201,8 +204,8 @@ def test_under_the_other_rules_the_advice_is_the_strategys_step_as_long_as_there
 ) -> None:
     definition = Definition(stop=StopRule(kind=rule, max_flights=12))
     flights = flown(*runs)
-    verdict = evaluate_stop_rule(definition, flights, proposal)
-    advice = advise(definition, QuadraticExperiment(), flights, proposal, verdict)
+    verdict = evaluate_stop_rule(known(definition, flights), proposal)
+    advice = advise(known(definition, flights), proposal, verdict)
     assert not verdict.stop
     assert (advice.kind, advice.gains["a"]) == (kind, a)
     assert advice.why
@@ -212,9 +215,7 @@ def test_a_step_is_advised_with_its_effect_beside_what_flights_can_tell_from_noi
     flights = flown((1, 0.5), (2, 0.4))
 
     def why(error: float) -> str:
-        proposal = proposed(error=error)
-        verdict = evaluate_stop_rule(PAPER, flights, proposal)
-        return advise(PAPER, QuadraticExperiment(), flights, proposal, verdict).why
+        return advised(known(PAPER, flights), proposed(error=error)).why
 
     assert why(0.3).startswith("The next step is predicted to reduce the error by 0.100 m, more than the 0.0082 m that")
     assert why(0.399).startswith("This step would reduce the error by 0.0010 m, less than the 0.00")
@@ -223,16 +224,17 @@ def test_a_step_is_advised_with_its_effect_beside_what_flights_can_tell_from_noi
 
 def test_a_campaign_reopened_after_its_rule_ended_it_is_advised_to_confirm_its_best() -> None:
     flights, proposal = flown((1, 0.5), (2, 0.4), (3, 0.41), (4, 0.42)), proposed(error=0.399)
-    verdict = evaluate_stop_rule(PAPER, flights, proposal, open_until_flight=6)
+    reopened = known(PAPER, flights, open_until_flight=6)
+    verdict = evaluate_stop_rule(reopened, proposal)
     assert not verdict.stop
-    advice = advise(PAPER, QuadraticExperiment(), flights, proposal, verdict, is_reopened=True)
+    advice = advise(reopened, proposal, verdict)
     assert (advice.kind, advice.gains["a"]) == ("repeat", 2.0)
 
 
 def test_when_the_rule_says_stop_the_advice_is_to_stop_with_the_best() -> None:
     flights = flown((1, 0.5), (2, 0.49), (3, 0.495))
     proposal = proposed(error=0.1)
-    advice = advise(PAPER, QuadraticExperiment(), flights, proposal, evaluate_stop_rule(PAPER, flights, proposal))
+    advice = advised(known(PAPER, flights), proposal)
     assert (advice.kind, advice.gains["a"]) == ("stop", 2)
     assert "did not improve" in advice.why
 
@@ -240,9 +242,7 @@ def test_when_the_rule_says_stop_the_advice_is_to_stop_with_the_best() -> None:
 def test_under_the_rule_noise_the_advice_is_the_proposal() -> None:
     flights = flown((1, 0.5), (2, 0.2))
     for kind in ("repeat", "baseline", "step"):
-        advice = advise(
-            NOISE, QuadraticExperiment(), flights, proposed(kind), evaluate_stop_rule(NOISE, flights, proposed(kind))
-        )
+        advice = advised(known(NOISE, flights), proposed(kind))
         assert (advice.kind, advice.gains["a"]) == (kind, 99.0)
 
 
@@ -250,21 +250,16 @@ def test_a_campaign_reopened_after_its_decision_is_advised_to_repeat_the_best_ga
     """Nothing else is offered, so a step must not be recommended."""
     flights = flown((1, 0.5), (2, 0.2), (2, 0.2), (1, 0.5))
     proposal = proposed("none", 0.2, a=2.0)
-    verdict = evaluate_stop_rule(NOISE, flights, proposal, open_until_flight=7)
-    advice = advise(NOISE, QuadraticExperiment(), flights, proposal, verdict)
+    reopened = known(NOISE, flights, open_until_flight=7)
+    advice = advised(reopened, proposal)
     assert (advice.kind, advice.gains["a"]) == ("repeat", 2.0)
     assert "Flying the best gains again shows whether their error stays the same." in advice.why
-    full = replace(NOISE, stop=replace(NOISE.stop, max_flights=4))
-    ended = advise(
-        full, QuadraticExperiment(), flights, proposal, evaluate_stop_rule(full, flights, proposal, open_until_flight=7)
-    )
-    assert "No further step is flown: the budget of 4 flights is used up." in ended.why
 
 
 def test_a_flight_that_is_no_step_says_why_there_is_none() -> None:
     def why(flights: list[Flight], proposal: Proposal, budget: int = 12) -> str:
         definition = replace(NOISE, stop=replace(NOISE.stop, max_flights=budget))
-        return confirm(definition, QuadraticExperiment(), flights, proposal).why
+        return confirm(known(definition, flights), proposal).why
 
     once, twice = flown((1, 0.5), (2, 0.2)), flown((1, 0.5), (2, 0.2), (2, 0.2))
     decided = flown((1, 0.5), (2, 0.2), (2, 0.2), (1, 0.5))
@@ -279,9 +274,9 @@ def test_a_flight_that_is_no_step_says_why_there_is_none() -> None:
 
 def test_gains_that_look_certainly_better_are_flown_again_for_a_reason_that_is_given() -> None:
     confirmed = proposed(error=0.199)
-    first = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2)), confirmed)
+    first = confirm(known(NOISE, flown((1, 0.5), (2, 0.2))), confirmed)
     assert first.phase == "repeat"
     assert "because no gain set has two valid flights, and the confidence assumes a prior estimate" in first.why
-    then = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2), (2, 0.2)), confirmed)
+    then = confirm(known(NOISE, flown((1, 0.5), (2, 0.2), (2, 0.2))), confirmed)
     assert then.phase == "baseline"
     assert "they were flown once, the best gains twice" in then.why

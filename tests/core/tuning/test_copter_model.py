@@ -22,7 +22,7 @@ from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Proposal
 from bench.copters.campaign_flights import RIGS, CampaignRig
 from tests.core.analysis.px4_flights import CALM
-from tests.core.tuning.defined import fitted_predictor, modelled_flights, next_proposal
+from tests.core.tuning.defined import evidence, fitted_predictor, modelled_flights, next_proposal
 from tests.core.tuning.flying import compiled_only
 
 AS_GOOD: Final = {
@@ -66,7 +66,7 @@ def test_the_second_flight_is_better_and_where_it_was_predicted(autopilot: str) 
     steps = rig.experiment.configured(OPTIONS)
     second = fly(rig, 2, proposal.gains)
     assert proposal.kind == "step"
-    assert check_policy(definition_of(rig), steps, steps.space, proposal.gains, [first]).passed
+    assert check_policy(evidence(definition_of(rig), steps, [first]), proposal.gains).passed
     assert first.error is not None
     assert second.error is not None
     assert proposal.interval is not None
@@ -173,7 +173,7 @@ def test_a_flight_that_the_model_does_not_fly_is_refused() -> None:
     filtered = replace(first, parameters={**first.parameters, "PSC_ACCZ_NTF": 1.0})
     with pytest.raises(TrajectoryError, match=r"Flight 1 cannot be fitted\. PSC_ACCZ_NTF: must be 0"):
         CopterModel(steps, [filtered])
-    assert known_distribution(steps, [filtered]) == prior_distribution(steps)
+    assert known_distribution(evidence(Definition(), steps, [filtered])) == prior_distribution(steps)
 
 
 @compiled_only
@@ -187,7 +187,8 @@ def test_a_proposal_says_that_other_parameters_changed_between_the_flights() -> 
     notes = next_proposal(replace(definition_of(rig), strategy="manual"), flights).explanation.notes
     said = "The errors are compared as if only the gains had changed, but MOT_THST_HOVER was 0.35 in flight 1 and "
     assert [note for note in notes if "gains had changed" in note] == [f"{said}0.31 in flight 2."]
-    assert changed_parameters(rig.experiment, flights[:1]) == changed_parameters(rig.experiment, []) == ""
+    for few in (flights[:1], []):
+        assert changed_parameters(evidence(Definition(), rig.experiment, few)) == ""
 
 
 @pytest.mark.complete
@@ -202,7 +203,7 @@ def test_a_hover_throttle_outside_what_px4_finds_is_told_until_the_parameter_is_
     said = proposal.explanation.notes[0]
     assert "outside MPC_THR_HOVER ± HTE_THR_RANGE (0.450 … 0.850): the estimate in flight stops at 0.450" in said
     assert float(said.removesuffix(".").rpartition(" ")[2]) == pytest.approx(0.40, abs=0.01)
-    checks = check_policy(definition, steps, steps.space, proposal.gains, [first], spread=proposal.spread).checks
+    checks = check_policy(evidence(definition, steps, [first]), proposal.gains, spread=proposal.spread).checks
     (told,) = (check for check in checks if check.name == "hover throttle")
     assert told.passed
     assert told.limit == pytest.approx(0.45)
@@ -230,7 +231,7 @@ def test_a_record_without_the_throttle_is_refused_and_tells_nothing_of_the_vehic
     flight = fly(rig, 1, steps.space.mapping(steps.space.default))
     channels = {name: each for name, each in flight.trajectory.channels.items() if name != "throttle"}
     bare = replace(flight, trajectory=replace(flight.trajectory, channels=channels))
-    assert known_distribution(steps, [bare]) == prior_distribution(steps)
+    assert known_distribution(evidence(Definition(), steps, [bare])) == prior_distribution(steps)
     with pytest.raises(TrajectoryError, match="Flight 1 cannot be fitted"):
         next_proposal(definition_of(rig), [bare])
     assert np.isfinite(flight.error or np.nan)

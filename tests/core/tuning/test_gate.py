@@ -9,6 +9,7 @@ from app.core.definition import Definition, Start
 from app.core.errors import GainsError
 from app.core.experiments.base import Check, ParameterDistribution, prior_distribution
 from app.core.tuning.gate import GateResult, check_policy, check_step, problems_of_gate, require_flyable
+from tests.core.tuning.defined import evidence
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
 
 SPACE = TAKEOFF.space
@@ -17,7 +18,7 @@ DEFAULT: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 
 def check(name: str, gains: dict[str, float], definition: Definition | None = None, flown: bool = False) -> Check:
     flights = [fly(1, DEFAULT)] if flown else []
-    gate = check_policy(definition or Definition(), TAKEOFF, SPACE, gains, flights)
+    gate = check_policy(evidence(definition or Definition(), TAKEOFF, flights), gains)
     assert gate.passed == all(one.passed for one in gate.checks)
     return next(one for one in gate.checks if one.name == name)
 
@@ -47,7 +48,7 @@ def test_gains_out_of_their_bounds_are_refused_by_name(gains: dict[str, float], 
 def test_numbers_that_no_controller_holds_are_refused_alone_and_for_good(
     gains: dict[str, float], sentence: str, worst: float
 ) -> None:
-    gate = check_policy(Definition(), TAKEOFF, SPACE, gains, [])
+    gate = check_policy(evidence(Definition(), TAKEOFF, []), gains)
     assert [(one.name, one.passed, one.sentence) for one in gate.checks] == [("numbers", False, sentence)]
     assert gate.checks[0].worst == pytest.approx(worst, nan_ok=True)
     with pytest.raises(GainsError, match="The gate refuses these gains"):
@@ -84,8 +85,8 @@ def test_after_a_valid_flight_the_whole_range_is_open_by_default() -> None:
 def test_later_steps_are_measured_from_the_nearest_flown_gains() -> None:
     definition = Definition(step_fraction=0.1)
     flights = [fly(1, DEFAULT), fly(2, {"kp": 1600, "ki": 900, "kd": 127})]
-    near = check_policy(definition, TAKEOFF, SPACE, {"kp": 2000, "ki": 1000, "kd": 100}, flights)
-    far = check_policy(definition, TAKEOFF, SPACE, {"kp": 2001, "ki": 1000, "kd": 100}, flights)
+    near = check_policy(evidence(definition, TAKEOFF, flights), {"kp": 2000, "ki": 1000, "kd": 100})
+    far = check_policy(evidence(definition, TAKEOFF, flights), {"kp": 2001, "ki": 1000, "kd": 100})
     assert [one.passed for gate in (near, far) for one in gate.checks if one.name == "step"] == [True, False]
 
 
@@ -109,9 +110,8 @@ def test_what_is_reachable_passes_and_what_is_offered_is_reachable(gains: dict[s
 
 @compiled_only
 def test_a_pinned_gain_is_refused_at_any_other_value_and_flown_at_its_own() -> None:
-    space = TAKEOFF.space.narrowed({"ki": (13, 13)})
     definition = Definition(bounds={"ki": (13, 13)})
-    own, other = (check_policy(definition, TAKEOFF, space, DEFAULT | {"ki": ki}, []) for ki in (13, 14))
+    own, other = (check_policy(evidence(definition, TAKEOFF, []), DEFAULT | {"ki": ki}) for ki in (13, 14))
     assert (own.passed, other.passed) == (True, False)
     refused = other.checks[0]
     assert (refused.name, refused.gain, refused.worst) == ("bounds", "ki", math.inf)
@@ -119,14 +119,14 @@ def test_a_pinned_gain_is_refused_at_any_other_value_and_flown_at_its_own() -> N
 
 @compiled_only
 def test_a_refused_step_names_its_gain() -> None:
-    gate = check_policy(Definition(), TAKEOFF, TAKEOFF.space, DEFAULT | {"kd": 400}, [])
+    gate = check_policy(evidence(Definition(), TAKEOFF, []), DEFAULT | {"kd": 400})
     assert [(check.name, check.gain) for check in gate.checks if not check.passed] == [("step", "kd")]
 
 
 @compiled_only
 def test_a_refusal_is_overruled_on_a_simulated_vehicle_and_on_a_real_one_by_nobody() -> None:
-    refused = check_policy(Definition(), TAKEOFF, SPACE, DEFAULT | {"ki": 1356}, [])
-    passed = check_policy(Definition(), TAKEOFF, SPACE, DEFAULT, [])
+    refused = check_policy(evidence(Definition(), TAKEOFF, []), DEFAULT | {"ki": 1356})
+    passed = check_policy(evidence(Definition(), TAKEOFF, []), DEFAULT)
     assert require_flyable(refused, overrule="the paper flew it") == "the paper flew it"
     assert require_flyable(passed, overrule="to be sure") == require_flyable(passed) == ""
     with pytest.raises(GainsError, match="The gate cannot be overruled on a real vehicle"):
@@ -147,7 +147,7 @@ def test_random_models_are_of_the_distribution_that_the_gate_samples() -> None:
 def test_what_is_offered_for_several_refusals_passes_all_of_these_checks() -> None:
     """Bounds and wrapping let ki = 1073 pass, the step limit only 13 + 0.25·1073 = 281."""
     asked: dict[str, float] = {"kp": 1624, "ki": 1356, "kd": 195}
-    refused = check_policy(Definition(), TAKEOFF, SPACE, asked, [])
+    refused = check_policy(evidence(Definition(), TAKEOFF, []), asked)
     merged = {name: value for one in refused.refusals for name, value in one.offer.items()}
     assert merged == {"kp": 1283, "ki": 281, "kd": 184}
     assert all(one.offer.get("ki", 281) == 281 for one in refused.refusals)
@@ -158,7 +158,7 @@ def test_what_is_offered_for_several_refusals_passes_all_of_these_checks() -> No
     assert "The largest ki that cannot overflow is 1073." in str(raised.value)
     assert ".." not in str(raised.value)
     limits = {"bounds", "step", "wrapping"}
-    offered = check_policy(Definition(), TAKEOFF, SPACE, asked | merged, [])
+    offered = check_policy(evidence(Definition(), TAKEOFF, []), asked | merged)
     assert all(one.passed for one in offered.checks if one.name in limits)
 
 
@@ -171,21 +171,21 @@ def test_gains_that_have_flown_may_fly_again_although_simulated_takeoffs_go_astr
         mean=light, covariance=tuple(tuple(row) for row in np.diag([4e-4] + [0.0] * 7).tolist()), origin="it"
     )
     kp_only: dict[str, float] = {"kp": 283, "ki": 13, "kd": 0}
-    fresh = check_policy(Definition(), TAKEOFF, SPACE, kp_only, flown, spread=far)
-    again = check_policy(Definition(), TAKEOFF, SPACE, kp_only, [*flown, fly(2, kp_only, light)], spread=far)
+    fresh = check_policy(evidence(Definition(), TAKEOFF, flown), kp_only, spread=far)
+    again = check_policy(evidence(Definition(), TAKEOFF, [*flown, fly(2, kp_only, light)]), kp_only, spread=far)
     assert "altitude" in {one.name for one in fresh.refusals}
     assert "altitude" not in {one.name for one in again.refusals}
     told = [one for one in again.checks if one.name == "altitude"]
     assert told[0].sentence.endswith("completed with these gains, so they are allowed again.")
     papers: dict[str, float] = DEFAULT | {"ki": 1356}
-    wrapping = check_policy(Definition(), TAKEOFF, SPACE, papers, [*flown, fly(2, papers)], spread=far)
+    wrapping = check_policy(evidence(Definition(), TAKEOFF, [*flown, fly(2, papers)]), papers, spread=far)
     assert {"bounds", "wrapping"} <= {one.name for one in wrapping.refusals}
 
 
 @compiled_only
 def test_the_step_of_a_gain_outside_its_bounds_is_that_to_the_bound() -> None:
     """Its distance in percent of the range says nothing: the bound is what refuses it."""
-    result = check_policy(Definition(step_fraction=1.0), TAKEOFF, SPACE, DEFAULT | {"kp": 99999}, [fly(1, DEFAULT)])
+    result = check_policy(evidence(Definition(step_fraction=1.0), TAKEOFF, [fly(1, DEFAULT)]), DEFAULT | {"kp": 99999})
     assert [check.name for check in result.refusals if check.name in {"bounds", "step"}] == ["bounds"]
     assert next(check.offer for check in result.refusals if check.name == "bounds") == {"kp": 4000}
 

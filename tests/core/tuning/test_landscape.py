@@ -5,14 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from app.autopilots.registry import evidence_of
 from app.core.definition import Definition, Donor, Flight, Start
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.policy import Gains
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.landscape import Landscape, LandscapePlan, predict_points
+from app.core.tuning.landscape import Landscape, plan_grid, predict_points
 from app.core.tuning.predictions import predict_flight
-from tests.core.tuning.defined import next_proposal, plan_grid
+from tests.core.tuning.defined import next_proposal
 from tests.core.tuning.flying import compiled_only
 
 START: Gains = {"kp": 283, "ki": 13, "kd": 82}
@@ -28,9 +29,7 @@ def flight(number: int = 1, gains: Gains = START, hover: float = 0.6) -> Flight:
 
 
 def surveyed(definition: Definition, flights: Sequence[Flight], centre: Gains, *marks: Gains) -> Landscape:
-    survey = plan_grid(
-        LandscapePlan(definition=definition, flights=tuple(flights), donor=None, centre=centre, marks=marks)
-    )
+    survey = plan_grid(evidence_of(definition, flights), centre, marks)
     assert survey is not None
     return survey.landscape(predict_points(survey.predict_errors, survey.points()))
 
@@ -106,7 +105,7 @@ def test_a_warm_start_s_landscape_is_that_of_the_vehicle_it_starts_from() -> Non
     definition = Definition(
         start=Start(kind="campaign", gains=dict(tuned), donor=Donor(campaign_id=1, trial_number=5, checksum="0"))
     )
-    survey = plan_grid(LandscapePlan(definition=definition, flights=(), donor=donor, centre=tuned, marks=()))
+    survey = plan_grid(evidence_of(definition, (), donor=donor), tuned, ())
     assert survey is not None
     assert predict_points(survey.predict_errors, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
 
@@ -134,5 +133,4 @@ def test_of_six_gains_those_are_varied_that_the_error_hangs_on() -> None:
 
 
 def test_without_a_model_there_is_no_landscape() -> None:
-    plan = LandscapePlan(definition=Definition(experiment="takeoff-px4"), flights=(), donor=None, centre={}, marks=())
-    assert plan_grid(plan) is None
+    assert plan_grid(evidence_of(Definition(experiment="takeoff-px4"), ()), {}, ()) is None

@@ -9,7 +9,7 @@ from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.vertical import packed
 from app.autopilots.px4.experiments import Px4Loop, px4_loop
 from app.autopilots.px4.replica.parameters import Parameters as Px4Parameters
-from app.autopilots.registry import experiment_of, space_of
+from app.autopilots.registry import evidence_of, experiment_of
 from app.core.definition import Definition, LogEvidence, Start
 from app.core.experiments.base import prior_distribution
 from app.core.tuning.gate import check_policy
@@ -30,7 +30,7 @@ WITHOUT = replace(WITH_LOG, start=Start(kind="given", gains=FIRM))
 
 
 def refused_by(definition: Definition) -> list[str]:
-    gate = check_policy(definition, experiment_of(definition), space_of(definition), FIRM, [])
+    gate = check_policy(evidence_of(definition, []), FIRM)
     return [check.name for check in gate.refusals]
 
 

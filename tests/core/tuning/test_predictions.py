@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from app.core.definition import Definition, Flight, Prediction
-from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
+from app.core.statistics.comparisons import groups_of
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from app.core.tuning.predictions import interval_scale, repeat_proposal, track_record, with_interval
 from app.core.tuning.strategy import Explanation, Proposal, proposal_of
@@ -15,7 +15,6 @@ from bench.predictions import prediction_of
 from tests.core.tuning.bowl import OFFSET, QuadraticExperiment, fly
 from tests.core.tuning.defined import evidence
 
-SCATTER = PooledScatter(sigma=0.01, degrees_of_freedom=4.0)
 T = float(stats.t.ppf(0.95, 4))
 WHY = Explanation(summary="Because.")
 
@@ -96,21 +95,21 @@ def test_a_flight_carries_its_prediction() -> None:
 def test_another_flight_of_a_policy_is_expected_at_the_mean_of_its_flights() -> None:
     flights = [fly(1, 50, 50, 0.2), fly(2, 30, 40), fly(3, 50, 50, 0.3)]
     group = groups_of(flights)[0]
-    again = repeat_proposal(QuadraticExperiment(), flights, group, SCATTER, "repeat", WHY)
+    again = repeat_proposal(evidence(Definition(), QuadraticExperiment(), flights), group, "repeat", WHY)
     assert again.predicted is not None
     assert again.interval is not None
     assert (again.kind, again.gains) == ("repeat", {"a": 50, "b": 50})
     assert again.predicted_error == pytest.approx(group.mean)
     assert again.predicted["depth"] == pytest.approx(np.full(11, 6.25), abs=1e-6)
-    assert again.interval.upper - group.mean == pytest.approx(T * 0.01 * np.sqrt(1.5))
+    scatter = np.sqrt((4.0 * 0.01**2 + 2.0 * 0.05**2) / 5.0)  # the prior's, with the two flights' 0.05 from their mean
+    assert again.interval.upper - group.mean == pytest.approx(stats.t.ppf(0.95, 5) * scatter * np.sqrt(1.5), rel=1e-4)
 
 
 def test_gains_whose_repeats_gave_the_same_error_are_predicted_without_scatter() -> None:
     """As in a simulation without noise: an interval would be the prior's, which the flights contradict."""
     flights = [fly(1, 50, 50), fly(2, 30, 40), fly(3, 30, 40)]
     groups = groups_of(flights)
-    scatter = pool_scatter(groups, QuadraticExperiment.scatter)
-    again = repeat_proposal(QuadraticExperiment(), flights, groups[0], scatter, "repeat", WHY)
+    again = repeat_proposal(evidence(Definition(), QuadraticExperiment(), flights), groups[0], "repeat", WHY)
     assert again.predicted_error == groups[0].mean
     assert again.interval is None
     assert again.predicted is not None

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.autopilots.registry import experiment_of
+from app.autopilots.registry import evidence_of
 from app.core.definition import Definition, Flight, Start, StopRule
 from app.core.tuning.gate import check_policy
 from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
-from tests.core.tuning.defined import next_proposal, problems_of
+from tests.core.tuning.defined import evidence, next_proposal, problems_of
 from tests.core.tuning.flying import ARDRONE, TAKEOFF, TWIN, campaign, compiled_only, errors, fly
 
 pytestmark = compiled_only
@@ -79,8 +79,9 @@ def test_who_follows_the_advice_under_the_papers_rule_flies_the_papers_loop(
     flights, proposals = campaign(definition, ARDRONE)
     for number, proposal in enumerate(proposals):
         history = flights[:number]
-        verdict = evaluate_stop_rule(definition, history, proposal)
-        advice = advise(definition, TAKEOFF, history, proposal, verdict)
+        known = evidence_of(definition, history)
+        verdict = evaluate_stop_rule(known, proposal)
+        advice = advise(known, proposal, verdict)
         if number == len(flights):
             assert (verdict.reason, advice.kind) == (ended, "stop")
         else:
@@ -114,7 +115,7 @@ def test_every_proposal_is_recomputed_bit_for_bit_and_passes_the_gate(definition
     for number, proposal in enumerate(proposals):
         history = copy.deepcopy(flights[:number])
         assert same(proposal, next_proposal(copy.deepcopy(definition), history))
-        assert check_policy(definition, TAKEOFF, space, proposal.gains, history, start=proposals[0].gains).passed
+        assert check_policy(evidence(definition, TAKEOFF, history), proposal.gains, start=proposals[0].gains).passed
         assert space.check(proposal.gains) == proposal.gains
 
 
@@ -158,8 +159,9 @@ def test_start_gains_that_a_limit_aborted_are_advised_against_and_after_a_second
 
     def judged(flights: Sequence[Flight]) -> tuple[str, str | None, str]:
         proposal = next_proposal(definition, flights)
-        verdict = evaluate_stop_rule(definition, flights, proposal)
-        advice = advise(definition, experiment_of(definition), flights, proposal, verdict)
+        known = evidence_of(definition, flights)
+        verdict = evaluate_stop_rule(known, proposal)
+        advice = advise(known, proposal, verdict)
         return advice.kind, verdict.reason, advice.why
 
     kind, reason, why = judged([first])
@@ -211,11 +213,11 @@ def test_under_the_rule_noise_gains_outside_the_bounds_are_not_flown_again(strat
     flights = [fly(1, {"kp": 283, "ki": 13, "kd": 82}), fly(2, {"kp": 1600, "ki": 900, "kd": 150})]
     while (proposal := next_proposal(definition, flights)).kind != "none":
         assert proposal.spread is not None
-        assert check_policy(definition, TAKEOFF, space, proposal.gains, flights, spread=proposal.spread).passed
+        assert check_policy(evidence(definition, TAKEOFF, flights), proposal.gains, spread=proposal.spread).passed
         flights.append(fly(len(flights) + 1, proposal.gains))
     assert space.check(proposal.gains) == proposal.gains
     assert "Flight 2 lies outside the bounds and is not compared." in proposal.explanation.summary
-    assert evaluate_stop_rule(definition, flights, proposal).reason == "told from noise"
+    assert evaluate_stop_rule(evidence(definition, TAKEOFF, flights), proposal).reason == "told from noise"
 
 
 def test_under_the_rule_noise_after_flights_outside_the_bounds_alone_the_strategy_goes_on() -> None:
@@ -231,7 +233,7 @@ def test_under_the_rule_noise_a_campaign_ends_where_the_gate_refuses_what_it_wou
     undamped: dict[str, float] = {"kp": 1500, "ki": 1000, "kd": 40}
     flights = [fly(number, undamped if number == 1 else {"kp": 1600, "ki": 900, "kd": 150}) for number in (1, 2, 3)]
     proposal = next_proposal(definition, flights)
-    assert not check_policy(definition, TAKEOFF, TAKEOFF.space, undamped, flights, spread=proposal.spread).passed
+    assert not check_policy(evidence(definition, TAKEOFF, flights), undamped, spread=proposal.spread).passed
     assert (proposal.kind, proposal.gains) == ("none", flights[1].gains)
     assert (
         "kp 1500, ki 1000, kd 40 cannot be flown again, because the gate refuses them: " in proposal.explanation.summary

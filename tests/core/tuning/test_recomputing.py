@@ -15,7 +15,7 @@ from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
 from bench.predictions import prediction_of
-from tests.core.tuning.defined import next_proposal, problems_of
+from tests.core.tuning.defined import evidence, next_proposal, problems_of
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 pytestmark = compiled_only
@@ -65,12 +65,12 @@ def test_every_proposal_and_every_advice_is_recomputed_bit_for_bit(definition: D
     flights: list[Flight] = []
     for number, flown in enumerate(flying, start=1):
         proposal = next_proposal(definition, flights, donor)
-        verdict = evaluate_stop_rule(definition, flights, proposal)
-        advice = advise(definition, TAKEOFF, flights, proposal, verdict)
+        verdict = evaluate_stop_rule(evidence(definition, TAKEOFF, flights), proposal)
+        advice = advise(evidence(definition, TAKEOFF, flights), proposal, verdict)
         again = next_proposal(copy.deepcopy(definition), copy.deepcopy(flights), copy.deepcopy(donor))
         assert content(again) == content(proposal)
-        assert evaluate_stop_rule(definition, flights, again) == verdict
-        assert advise(definition, TAKEOFF, copy.deepcopy(flights), again, verdict) == advice
+        assert evaluate_stop_rule(evidence(definition, TAKEOFF, flights), again) == verdict
+        assert advise(evidence(definition, TAKEOFF, copy.deepcopy(flights)), again, verdict) == advice
         assert proposal.predicted_error is not None
         if proposal.interval is None:
             flown_again = [flight.error for flight in flights if flight.gains == proposal.gains]

@@ -14,7 +14,7 @@ from app.core.tuning.campaign_models import StepsModel
 from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Proposal
 from bench.copters.paparazzi_simulation import SteppedVehicle, fly, within_margin
-from tests.core.tuning.defined import next_proposal
+from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
@@ -77,9 +77,9 @@ def test_the_throttle_moves_little_more_than_in_the_first_flight_and_no_vehicle_
     moves, rings = proposal().explanation.notes[:2]
     assert "times as much as with the gains of the first flight; 1.5 times is allowed." in moves
     assert rings.startswith("With 30 ms more delay, the altitude begins to ring with ")
-    gate = check_policy(DEFINITION, STEPS, STEPS.space, proposal().gains, [first()[0]], spread=proposal().spread)
+    gate = check_policy(evidence(DEFINITION, STEPS, [first()[0]]), proposal().gains, spread=proposal().spread)
     assert gate.passed
-    refused = check_policy(DEFINITION, STEPS, STEPS.space, LARGEST, [first()[0]], spread=proposal().spread)
+    refused = check_policy(evidence(DEFINITION, STEPS, [first()[0]]), LARGEST, spread=proposal().spread)
     assert [check.name for check in refused.refusals] == ["margin"]
 
 

@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -5,11 +6,18 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, Flight, StopRule
+from app.core.experiments.base import Experiment
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.stop_rules import decide_stop, evaluate_stop_rule, landing_battery_v, starting_battery_v
 from app.core.tuning.strategy import Explanation, Proposal
-from tests.core.tuning.bowl import fly
+from tests.core.tuning.bowl import QuadraticExperiment, fly
+from tests.core.tuning.defined import evidence
 
 PAPER = StopRule(kind="paper")
+
+
+def known(definition: Definition, flights: Sequence[Flight], open_until_flight: int = 0) -> Evidence[Experiment]:
+    return evidence(definition, QuadraticExperiment(), flights, open_until_flight=open_until_flight)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +79,7 @@ def test_gains_that_were_aborted_twice_are_not_proposed_a_third_time_whatever_th
 
     def reason(*flights: Flight, proposal: Proposal = repeat, open_until_flight: int = 0) -> str | None:
         definition = Definition(stop=StopRule(kind="noise"))
-        return evaluate_stop_rule(definition, flights, proposal, open_until_flight=open_until_flight).reason
+        return evaluate_stop_rule(known(definition, flights, open_until_flight=open_until_flight), proposal).reason
 
     assert reason(valid, again) is None
     assert reason(valid, again, other) is None
@@ -138,22 +146,22 @@ def test_repeats_and_baselines_are_no_failures_to_improve() -> None:
     """Seen: “the last 2 flights did not improve” after the two repeats that the program itself had asked for."""
     flights = [fly(1, 90, 90), fly(2, 30, 40), fly(3, 30, 40), fly(4, 90, 90)]
     definition = Definition(stop=StopRule(kind="paper", max_flights=9))
-    assert evaluate_stop_rule(definition, flights, STEP).failures == 0
+    assert evaluate_stop_rule(known(definition, flights), STEP).failures == 0
     worse = [*flights, fly(5, 50, 50), fly(6, 50, 50)]
-    assert evaluate_stop_rule(definition, worse, STEP).failures == 1
-    assert evaluate_stop_rule(definition, [*worse, fly(7, 60, 50)], STEP).reason == "not improving"
+    assert evaluate_stop_rule(known(definition, worse), STEP).failures == 1
+    assert evaluate_stop_rule(known(definition, [*worse, fly(7, 60, 50)]), STEP).reason == "not improving"
 
 
 def test_gains_that_were_only_aborted_before_are_no_repeat() -> None:
     aborted = replace(fly(1, 30, 40), outcome="aborted", error=None)
     flights = [aborted, fly(2, 30, 40)]
-    verdict = evaluate_stop_rule(Definition(stop=StopRule(kind="paper", improvement=0.5)), flights, STEP)
+    verdict = evaluate_stop_rule(known(Definition(stop=StopRule(kind="paper", improvement=0.5)), flights), STEP)
     assert verdict.threshold == pytest.approx(0.5 * (flights[1].error or 0.0))
 
 
 def test_a_reopened_campaign_is_still_warned_of_a_low_battery() -> None:
     definition = Definition(stop=StopRule(kind="paper", min_battery_v=10.5))
-    verdict = evaluate_stop_rule(definition, [fly(1, 30, 40)], STEP, battery_v=10.2, open_until_flight=4)
+    verdict = evaluate_stop_rule(known(definition, [fly(1, 30, 40)], open_until_flight=4), STEP, battery_v=10.2)
     assert not verdict.stop
     assert verdict.why.startswith(
         "Reopened for 3 more flights. The last flight ended at 10.20 V; the minimum is 10.5 V."
@@ -164,7 +172,7 @@ def test_a_reopened_campaign_is_still_warned_of_a_low_battery() -> None:
 def test_no_rule_ends_a_campaign_before_the_flights_it_was_reopened_for(flown: int) -> None:
     flights = [fly(number, 30, 40) for number in range(1, flown + 1)]
     definition = Definition(stop=StopRule(kind="budget", max_flights=1))
-    verdict = evaluate_stop_rule(definition, flights, STEP, open_until_flight=3)
+    verdict = evaluate_stop_rule(known(definition, flights, open_until_flight=3), STEP)
     assert (verdict.stop, verdict.reason) == ((False, None) if flown < 3 else (True, "flight budget"))
     assert verdict.why == (
         "Reopened for 1 more flight."
@@ -177,6 +185,6 @@ def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
     proposal = STEP
     definition = Definition(stop=StopRule(kind="paper", min_battery_v=10.5))
     for flights in ([], [fly(1, 30, 40)]):
-        assert evaluate_stop_rule(definition, flights, proposal).reason is None
-        assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.6).reason is None
-        assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.4).reason == "battery low"
+        assert evaluate_stop_rule(known(definition, flights), proposal).reason is None
+        assert evaluate_stop_rule(known(definition, flights), proposal, battery_v=10.6).reason is None
+        assert evaluate_stop_rule(known(definition, flights), proposal, battery_v=10.4).reason == "battery low"

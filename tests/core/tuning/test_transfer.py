@@ -12,7 +12,7 @@ from app.core.tuning.campaign_models import as_flown
 from app.core.tuning.corrected_model import correct_by_bias
 from app.core.tuning.transfer import transfer
 from tests.core.tuning import bowl
-from tests.core.tuning.defined import next_proposal
+from tests.core.tuning.defined import evidence, next_proposal
 from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 TUNED: dict[str, float] = {"kp": 1600, "ki": 900, "kd": 150}
@@ -49,7 +49,7 @@ def test_the_first_flight_is_the_others_best_and_is_expected_to_score_as_there()
 @compiled_only
 def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first_step() -> None:
     first = fly(1, TUNED, model(*ALIKE))
-    found = transfer(WARM, TAKEOFF, [first], donor())
+    found = transfer(evidence(WARM, TAKEOFF, [first], donor=donor()))
     assert found.agreement is not None
     assert 0.5 < found.agreement < 1.0
     assert found.step_fraction == pytest.approx(found.agreement * WARM.step_fraction)
@@ -63,7 +63,7 @@ def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first
 @compiled_only
 def test_the_step_is_shortened_for_the_second_flight_only() -> None:
     flights = [fly(1, TUNED, model(*ALIKE)), fly(2, {**TUNED, "kp": 1700}, model(*ALIKE))]
-    found = transfer(WARM, TAKEOFF, flights, donor())
+    found = transfer(evidence(WARM, TAKEOFF, flights, donor=donor()))
     assert found.step_fraction == WARM.step_fraction
     assert "first step" not in found.sentence
 
@@ -71,7 +71,7 @@ def test_the_step_is_shortened_for_the_second_flight_only() -> None:
 @compiled_only
 def test_an_unlike_vehicle_takes_nothing_over() -> None:
     first = fly(1, TUNED, model(*UNLIKE))
-    found = transfer(WARM, TAKEOFF, [first], donor())
+    found = transfer(evidence(WARM, TAKEOFF, [first], donor=donor()))
     assert found.agreement is not None
     assert found.agreement < 0.5
     assert found.experiment is TAKEOFF
@@ -85,13 +85,15 @@ def test_an_unlike_vehicle_takes_nothing_over() -> None:
 def test_before_the_first_valid_flight_nothing_is_decided() -> None:
     flight = bowl.fly(1, 50, 50)
     aborted = Flight(number=1, gains=flight.gains, trajectory=flight.trajectory, error=None, outcome="aborted")
-    found = transfer(WARM, bowl.QuadraticExperiment(), [aborted], flight)
+    found = transfer(evidence(WARM, bowl.QuadraticExperiment(), [aborted], donor=flight))
     assert (found.agreement, found.sentence, found.step_fraction) == (None, "", WARM.step_fraction)
 
 
 def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_explains() -> None:
     """Offsets 0.4 (A) and 0.5 (B), scatter 0.01: 1 − (0.1² − 2·0.01²)/0.5²."""
-    found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, 0.5)], bowl.fly(3, 50, 50, 0.4))
+    found = transfer(
+        evidence(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, 0.5)], donor=bowl.fly(3, 50, 50, 0.4))
+    )
     assert found.agreement == pytest.approx(1.0 - (0.01 - 0.0002) / 0.25, abs=1e-5)
     assert "The other vehicle's best gains are used" in found.sentence
 
@@ -100,7 +102,9 @@ def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_expl
 def test_scatter_is_no_disagreement_and_the_opposite_is_none_of_an_agreement(
     theirs: float, ours: float, agreement: float
 ) -> None:
-    found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, ours)], bowl.fly(3, 50, 50, theirs))
+    found = transfer(
+        evidence(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, ours)], donor=bowl.fly(3, 50, 50, theirs))
+    )
     assert found.agreement == pytest.approx(agreement)
 
 
@@ -115,7 +119,7 @@ def test_each_vehicle_is_modelled_under_the_parameters_that_it_flew_with() -> No
     theirs = Flight(number=5, gains=gains, trajectory=record, error=0.1, outcome="valid", parameters=slow)
     ours = replace(theirs, trajectory=steps.simulate(steps.space.default, steps.nominal_model), parameters={})
     assert np.abs(correct_by_bias(steps, theirs).bias).max() < 1e-6
-    assert transfer(WARM, steps, [ours], theirs).agreement == 1.0
+    assert transfer(evidence(WARM, steps, [ours], donor=theirs)).agreement == 1.0
     firmer = steps.space.vector({**gains, "PSC_ACCZ_P": 0.8})[np.newaxis]
     expected = steps.under(slow).outputs(firmer, steps.nominal_model)
-    assert as_flown(steps, [], theirs).outputs(firmer, steps.nominal_model).tolist() == expected.tolist()
+    assert as_flown(steps, [theirs]).outputs(firmer, steps.nominal_model).tolist() == expected.tolist()

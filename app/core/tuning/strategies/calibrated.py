@@ -15,9 +15,10 @@ from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
 from app.core.policy import Box, PolicySpace, Vector
 from app.core.tuning.campaign_models import FITTED, CampaignModel, fit
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import allows
 from app.core.tuning.predictions import FlightPrediction
-from app.core.tuning.strategy import Evidence, Explanation, Kind, Proposal, Strategy, proposal_of
+from app.core.tuning.strategy import Explanation, Kind, Proposal, Strategy, proposal_of
 
 _HALVINGS: Final = 5
 _DIFFERENCE: Final = 0.1
@@ -87,7 +88,7 @@ def trust_fraction(flights: Sequence[Flight]) -> float:
 
 def fitted_model(evidence: Evidence[ModelledExperiment]) -> CampaignModel:
     """The calibrated model. At least one flight must be valid."""
-    return fit(evidence.experiment, evidence.flights)
+    return fit(evidence)
 
 
 def _choose(evidence: Evidence[ModelledExperiment], model: CampaignModel, box: Box) -> _ChosenGains:

@@ -21,8 +21,9 @@ from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.campaign_models import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import allows
-from app.core.tuning.strategy import Evidence, Explanation, Kind, LadderStep, Proposal, Strategy, proposal_of
+from app.core.tuning.strategy import Explanation, Kind, LadderStep, Proposal, Strategy, proposal_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
     ladder = evaluate_lengths(line, metric.ladder, model)
     best = min(ladder, key=lambda step: step.predicted_error)
     now = float(model.errors(base_gains[np.newaxis])[0])
-    spread = known_distribution(evidence.experiment, flights)
+    spread = known_distribution(evidence)
 
     def passes(gains: Vector) -> bool:
         return allows(evidence, gains, spread)

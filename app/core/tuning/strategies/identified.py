@@ -28,8 +28,8 @@ from app.core.models.f16 import LARGEST_ERROR_RAD, PITCH, RATE_HZ, STATES, STEP_
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples
 from app.core.tuning.corrected_model import CorrectedModel, Optimum, model_optimum, uncorrected_model
+from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import (
-    Evidence,
     Explanation,
     ModelPrediction,
     Proposal,

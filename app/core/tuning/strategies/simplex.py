@@ -10,7 +10,8 @@ from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.formatting import format_gains, short
 from app.core.tuning.corrected_model import CorrectedModel, model_optimum, uncorrected_model
-from app.core.tuning.strategy import Evidence, Explanation, Proposal, Strategy, proposal_of
+from app.core.tuning.evidence import Evidence
+from app.core.tuning.strategy import Explanation, Proposal, Strategy, proposal_of
 
 
 def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:

@@ -215,5 +215,5 @@ def test_the_vehicles_own_safe_gains_are_what_a_step_is_judged_with(
     definition = Definition(safe_gains=safe_gains)
     proposal = propose(evidence(definition, BOWL, [fly(1, 50.0, 70)]))
     assert proposal.gains["a"] == pytest.approx(a)
-    gate = check_policy(definition, BOWL, SPACE, proposal.gains, [fly(1, 50.0, 70)], spread=proposal.spread)
+    gate = check_policy(evidence(definition, BOWL, [fly(1, 50.0, 70)]), proposal.gains, spread=proposal.spread)
     assert gate.passed
