@@ -9,8 +9,6 @@ import json
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
 from io import SEEK_END
 from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
 
@@ -19,11 +17,11 @@ import zstandard
 from pydantic import BaseModel, ValidationError
 
 from app.autopilots.registry import EXPERIMENTS
-from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Record
+from app.bundles.contents import CONTENTS, MANIFEST, Campaign, Contents, Manifest, Record
+from app.bundles.earlier_versions import VERSION, bring_up_to_date
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
-from app.db.earlier_ends import give_end
 from app.db.models import TrajectoryRow
 from app.db.trajectories import unpack
 
@@ -44,8 +42,6 @@ _IN_MEMORY_BYTES: Final = 64 * 2**20
 _METHODS: Final = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 _ENCRYPTED: Final = 0x1
 _WIDTH: Final = 4
-_WITH_ENDS: Final = 6
-"""First version with the ends of flights as codes."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -100,13 +96,12 @@ class Bundle:
                 "file", "is not a zip file" if "not a zip" in str(error) else f"cannot be read as a zip file: {error}"
             )
         self._look_at_directory()
-        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest, look=_version)
+        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest)
         listed = self.manifest.parts.keys() | {MANIFEST}
         if odd := sorted(listed ^ set(self._zip.namelist())):
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip differ: {odd[0][:80]!r}")
-        tells_ends = self.manifest.version < _WITH_ENDS
         contents = self._listed(CONTENTS, MAX_JSON_BYTES)
-        self.contents = _parsed(CONTENTS, contents, Contents, look=_give_ends if tells_ends else None)
+        self.contents = _parsed(CONTENTS, contents, Contents, version=self.manifest.version)
         self._unpacked = _Unpacked()  # last, because a refused bundle must have nothing to close
 
     def __enter__(self) -> Self:
@@ -231,20 +226,8 @@ def _once(used: set[str], field: str, part: str) -> str:
     return part
 
 
-def _version(document: object) -> None:
-    if isinstance(document, dict) and isinstance(found := document.get("version"), int) and found > VERSION:
-        _refuse(f"{MANIFEST}: version", f"is {found}, written by a newer Gainline; this version reads up to {VERSION}")
-
-
-def _give_ends(document: Any) -> None:
-    """Give trials the ends that their reasons tell. Whatever is malformed is refused afterwards."""
-    with suppress(AttributeError, KeyError, TypeError):
-        for campaign in document["campaigns"]:
-            for trial in campaign["trials"]:
-                give_end(trial)
-
-
-def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], None] | None = None) -> M:
+def _parsed(name: str, data: bytes, kind: type[M], *, version: int = VERSION) -> M:
+    """The part as what it should be, in a bundle of that version."""
     if (values := sum(map(data.count, (b",", b"[", b"{")))) > MAX_VALUES:
         _refuse(
             name, f"contains about {values / 1e6:.0f} million values; at most {MAX_VALUES / 1e6:g} million are allowed"
@@ -253,8 +236,7 @@ def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], N
         document: Any = json.loads(data, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         _refuse(name, f"is not JSON: {error}")
-    if look is not None:
-        look(document)
+    bring_up_to_date(document, version)
     try:
         return kind.model_validate(document)
     except (ValidationError, RecursionError) as error:
