@@ -46,28 +46,6 @@ _WIDTH: Final = 4
 M = TypeVar("M", bound=BaseModel)
 
 
-class _Unpacked:
-    """Checked parts in a temporary file, so that the transaction that stores them only has to read them."""
-
-    def __init__(self) -> None:
-        self._file = tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES, prefix="gainline-bundle-")  # noqa: SIM115  # until `close`
-        self._places: dict[str, tuple[int, int]] = {}
-
-    def keep(self, name: str, data: bytes) -> None:
-        self._places[name] = self._file.seek(0, SEEK_END), len(data)
-        self._file.write(data)
-
-    def get(self, name: str) -> bytes | None:
-        """The part's data; None if it was not kept."""
-        if (place := self._places.get(name)) is None:
-            return None
-        self._file.seek(place[0])
-        return self._file.read(place[1])
-
-    def close(self) -> None:
-        self._file.close()
-
-
 class _Opening:
     """A file for `zipfile` that limits each read to the size of the directory while the zip is being opened."""
 
@@ -102,7 +80,10 @@ class Bundle:
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip differ: {odd[0][:80]!r}")
         contents = self._listed(CONTENTS, MAX_JSON_BYTES)
         self.contents = _parsed(CONTENTS, contents, Contents, version=self.manifest.version)
-        self._unpacked = _Unpacked()  # last, because a refused bundle must have nothing to close
+        # Checked parts, so that the transaction that stores them only reads them. Made last, because a refused bundle
+        # must have nothing to close.
+        self._unpacked = tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES, prefix="gainline-bundle-")  # noqa: SIM115
+        self._places: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -113,11 +94,13 @@ class Bundle:
 
     def part(self, name: str, limit: int = MAX_PART_BYTES) -> bytes:
         """Data of a part. Raises InputError when it is missing, too large, or does not match the manifest."""
-        if (kept := self._unpacked.get(name)) is not None:
-            return kept
-        data = self._listed(name, limit)
-        self._unpacked.keep(name, data)
-        return data
+        if name not in self._places:
+            data = self._listed(name, limit)
+            self._places[name] = self._unpacked.seek(0, SEEK_END), len(data)
+            self._unpacked.write(data)
+        start, size = self._places[name]
+        self._unpacked.seek(start)
+        return self._unpacked.read(size)
 
     def check(self) -> None:
         """Check every record and photo: checksums, sizes, types. Raises InputError that names the first invalid one."""
@@ -152,19 +135,21 @@ class Bundle:
     def _look_at_directory(self) -> None:
         infos = self._zip.infolist()
         names = [info.filename for info in infos]
-        if len(infos) > MAX_PARTS:
-            _refuse("file", f"has {len(infos)} parts; at most {MAX_PARTS} are allowed")
-        if len(set(names)) < len(names):
-            _refuse("file", "has two parts with the same name")
-        if MANIFEST not in names:
-            _refuse(MANIFEST, "is missing: this zip was not written by Gainline")
-        for info in infos:
-            if info.flag_bits & _ENCRYPTED or info.compress_type not in _METHODS:
-                _refuse(info.filename[:80], "is encrypted, or compressed with an unsupported method")
-        if (total := sum(info.file_size for info in infos)) > MAX_TOTAL_BYTES:
-            _refuse(
-                "file", f"would unpack to {total / 2**30:.1f} GiB; at most {MAX_TOTAL_BYTES / 2**30:g} GiB is allowed"
-            )
+        total = sum(info.file_size for info in infos)
+        limits = f"would unpack to {total / 2**30:.1f} GiB; at most {MAX_TOTAL_BYTES / 2**30:g} GiB is allowed"
+        foreign = "is encrypted, or compressed with an unsupported method"
+        for is_wrong, field, reason in (
+            (len(infos) > MAX_PARTS, "file", f"has {len(infos)} parts; at most {MAX_PARTS} are allowed"),
+            (len(set(names)) < len(names), "file", "has two parts with the same name"),
+            (MANIFEST not in names, MANIFEST, "is missing: this zip was not written by Gainline"),
+            *(
+                (info.flag_bits & _ENCRYPTED or info.compress_type not in _METHODS, info.filename[:80], foreign)
+                for info in infos
+            ),
+            (total > MAX_TOTAL_BYTES, "file", limits),
+        ):
+            if is_wrong:
+                _refuse(field, reason)
 
     def _read(self, name: str, limit: int) -> bytes:
         """Read a part; never unpacks more than `limit` + 1 bytes, whatever the directory states."""
@@ -242,7 +227,7 @@ def _parsed(name: str, data: bytes, kind: type[M], *, version: int = VERSION) ->
     except (ValidationError, RecursionError) as error:
         found = error.errors()[:10] if isinstance(error, ValidationError) else []
         problems = tuple(Problem(f"{name}: {'.'.join(map(str, each['loc']))}", each["msg"]) for each in found)
-        raise _refusal(problems or (Problem(name, "is nested too deeply"),)) from error
+        raise refusal(*(problems or (Problem(name, "is nested too deeply"),))) from error
 
 
 def _no_number(text: str) -> NoReturn:
@@ -250,12 +235,14 @@ def _no_number(text: str) -> NoReturn:
 
 
 def _refuse(field: str, reason: str) -> NoReturn:
-    raise _refusal((Problem(field, reason),))
+    raise refusal(Problem(field, reason))
 
 
-def _refusal(problems: tuple[Problem, ...]) -> InputError:
-    return InputError(
-        "This bundle cannot be imported; nothing was stored.",
-        problems=problems,
-        hint="Export the bundle again from the installation that has the campaign, and import that file unchanged.",
-    )
+_UNCHANGED: Final = (
+    "Export the bundle again from the installation that has the campaign, and import that file unchanged."
+)
+
+
+def refusal(*problems: Problem, hint: str = _UNCHANGED) -> InputError:
+    """Error of a bundle that cannot be imported."""
+    return InputError("This bundle cannot be imported; nothing was stored.", problems=problems, hint=hint)

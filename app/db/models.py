@@ -63,7 +63,16 @@ class VehicleRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-class VehicleActRow(Base, Reported):
+class _Requested(Reported):
+    """A row that asks something of a vehicle, which a worker claims."""
+
+    worker: Mapped[str | None]
+    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
+    claimed_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+
+class VehicleActRow(Base, _Requested):
     """An act: a request to a registered vehicle beside its flights, who made it and why, and the vehicle's answer.
 
     Written before anything is sent; except for land and motors off, which are sent at once and recorded afterwards.
@@ -91,10 +100,6 @@ class VehicleActRow(Base, Reported):
     read_back: Mapped[GainsJson | None]
     result: Mapped[JsonObject | None]
     problem: Mapped[str] = mapped_column(default="")
-    worker: Mapped[str | None]
-    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
-    claimed_at: Mapped[datetime | None]
-    finished_at: Mapped[datetime | None]
 
     vehicle: Mapped[VehicleRow] = relationship()
 
@@ -254,7 +259,7 @@ class ControllerCheckRow(Base, Reported):
     checked_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-class FlightRow(Base, Reported):
+class FlightRow(Base, _Requested):
     """One request to a vehicle, written before it is sent, and what the vehicle answered.
 
     A flight of mode `stage` waits with its gains on the vehicle until an operator sets `take_off_at`, or `stand_down`
@@ -293,11 +298,7 @@ class FlightRow(Base, Reported):
     battery_v_before: Mapped[float | None]
     battery_v_after: Mapped[float | None]
     speed: Mapped[float | None]
-    worker: Mapped[str | None]
     end: Mapped[FlightEnd | None]
-    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
-    claimed_at: Mapped[datetime | None]
-    finished_at: Mapped[datetime | None]
 
     campaign: Mapped[CampaignRow] = relationship()
     trial: Mapped[TrialRow] = relationship()

@@ -3,6 +3,7 @@ campaign's frozen settings, anomalies in the order of the flights, notes and pho
 still be sent.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -62,21 +63,13 @@ class Anomaly:
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class Photo:
-    """An unmodified photo."""
-
-    media_type: str
-    data: bytes
-    added_at: datetime
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """Remarks on a trial: its note, the photos that fit into the report, and the number of those left out."""
+    """Remarks on a trial: its note, the photos that fit into the report with their pictures loaded, and the number of
+    those left out."""
 
     trial: Trial
-    photos: tuple[Photo, ...]
+    photos: tuple[TrialPhotoRow, ...]
     left_out: int
 
 
@@ -264,21 +257,22 @@ MAX_PHOTO_BYTES: Final = 24 * 2**20
 
 def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
     """Remarks of the trials that have any, in order."""
-    photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
-    for row, size in photos_of_campaign(session, campaign_id):
-        photos.setdefault(row.trial_id, []).append((row, size))
-    kept, room = set[int](), MAX_PHOTO_BYTES
-    turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
-    for _, photo_id, size in turns:  # the first photo of each trial comes before the second of any
-        if size <= room:
-            kept.add(photo_id)
-            room -= size
+    sizes, room = dict(photos_of_campaign(session, campaign_id)), MAX_PHOTO_BYTES
+    by_trial = defaultdict[int, list[TrialPhotoRow]](list)
+    for row in sizes:
+        by_trial[row.trial_id].append(row)
+    kept = set[TrialPhotoRow]()
+    # The first photo of each trial comes before the second of any.
+    for row in sorted(sizes, key=lambda row: (by_trial[row.trial_id].index(row), row.id)):
+        if sizes[row] <= room:
+            session.refresh(row, ["data"])
+            kept.add(row)
+            room -= sizes[row]
     for trial in trials:
-        own = photos.get(trial.id, [])
-        if not trial.note and not own:
-            continue
-        shown = [Photo(row.media_type, row.data, row.added_at) for row, _ in own if row.id in kept]
-        yield Remark(trial=trial, photos=tuple(shown), left_out=len(own) - len(shown))
+        own = by_trial[trial.id]
+        shown = tuple(row for row in own if row in kept)
+        if trial.note or own:
+            yield Remark(trial=trial, photos=shown, left_out=len(own) - len(shown))
 
 
 def report_of(session: Session, campaign_id: int) -> Report:
