@@ -40,26 +40,24 @@ Gains = Annotated[dict[ShortText, int | float], Field(min_length=1, max_length=5
 Options = Annotated[dict[ShortText, OptionValue], Field(max_length=100)]
 
 
+_adapter: Final = cache(TypeAdapter[Any])
+
+
 def _fits(kind: Any) -> AfterValidator:
     """Validator that returns the same object if it is valid for this type; stored numbers must not change their
     type."""
 
-    @cache
-    def adapter() -> TypeAdapter[Any]:
-        return TypeAdapter(kind)
-
     def check(given: JsonObject) -> JsonObject:
-        adapter().validate_python(given)
+        _adapter(kind).validate_python(given)
         return given
 
     return AfterValidator(check)
 
 
 def _spread_of(given: JsonObject) -> JsonObject:
-    TypeAdapter(ParameterDistribution).validate_python(
-        {name: value for name, value in given.items() if name != "flights"}
-    )
-    TypeAdapter(list[int] | None).validate_python(given.get("flights"))
+    spread = {name: value for name, value in given.items() if name != "flights"}
+    _adapter(ParameterDistribution).validate_python(spread)
+    _adapter(list[int] | None).validate_python(given.get("flights"))
     return given
 
 

@@ -147,7 +147,15 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
             )
             for group in now.groups
         ],
-        comparison=None if now is None else _comparison(experiment, now),
+        comparison=None
+        if now is None or now.comparison is None
+        else Comparison.view_of(
+            now.comparison,
+            further=None
+            if now.comparison.further is None
+            else FlightsToDecide(best=now.comparison.further.first, baseline=now.comparison.further.second),
+            sentence=verdict_sentence(experiment, now),
+        ),
         drift=drift,
         battery_trend=None
         if now is None
@@ -204,19 +212,6 @@ def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestT
         mean=group.mean,
         standard_error=group.known_error(now.scatter),
         flights=group.size,
-    )
-
-
-def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | None:
-    comparison = now.comparison
-    if comparison is None:
-        return None
-    return Comparison.view_of(
-        comparison,
-        further=None
-        if comparison.further is None
-        else FlightsToDecide(best=comparison.further.first, baseline=comparison.further.second),
-        sentence=verdict_sentence(experiment, now),
     )
 
 
