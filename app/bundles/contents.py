@@ -1,10 +1,8 @@
-"""Schema of a bundle, version 6, with the validation of its contents.
+"""Schema of a bundle, with the validation of its contents; `app.bundles.earlier_versions` tells what earlier ones lack.
 
 A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
 campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
-in the database (`app.db.trajectories`), with its own checksum. Version 1 lacks `abort_cause`;
-versions below 4 lack rise time, settling time and steady-state error, below 5 the predicted curves of trials, below 6
-the ends of flights, of which they have the words.
+in the database (`app.db.trajectories`), with its own checksum.
 """
 
 from collections.abc import Set
@@ -12,10 +10,13 @@ from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field, TypeAdapter, model_validator
+from pydantic_core import PydanticCustomError
 
+from app.bundles.earlier_versions import VERSION
 from app.campaigns.schemas import Definition
+from app.campaigns.trials.schemas import TrialFacts
 from app.common.schemas import Gate, Name, OptionValue, Schema
-from app.common.states import AbortCause, CampaignState, Ending, Outcome, TrialKind, TrialState
+from app.common.states import CampaignState, Ending, Outcome, TrialState
 from app.core.experiments.base import ParameterDistribution
 from app.core.records.glitches import Glitch
 from app.core.tuning.proposals import Advice
@@ -23,71 +24,67 @@ from app.core.tuning.stop_rules import StopVerdict
 from app.core.tuning.strategy import Explanation, Interval
 from app.core.tuning.strategy import Kind as ProposalKind
 from app.db.types import JsonObject
-from app.vehicles.flight_end import FlightEnd
 
 FORMAT: Final = "gainline-campaign"
-VERSION: Final = 6
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
 MAX_CAMPAIGNS: Final = 20
 """Maximum number of campaigns in one bundle."""
 
-_MAX_CHARACTERS: Final = 10_000
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
 ShortText = Annotated[str, Field(max_length=200)]
-Sentence = Annotated[str, Field(max_length=_MAX_CHARACTERS)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Part = Annotated[str, Field(pattern=r"^(records|photos|telemetry)/[0-9a-z-]{1,60}\.[a-z]{3,5}$")]
-Gains = Annotated[dict[ShortText, int | Finite], Field(min_length=1, max_length=50)]
+Gains = Annotated[dict[ShortText, int | float], Field(min_length=1, max_length=50)]
 Options = Annotated[dict[ShortText, OptionValue], Field(max_length=100)]
+
+
+_adapter: Final = cache(TypeAdapter[Any])
 
 
 def _fits(kind: Any) -> AfterValidator:
     """Validator that returns the same object if it is valid for this type; stored numbers must not change their
     type."""
 
-    @cache
-    def adapter() -> TypeAdapter[Any]:
-        return TypeAdapter(kind)
-
     def check(given: JsonObject) -> JsonObject:
-        adapter().validate_python(given)
+        _adapter(kind).validate_python(given)
         return given
 
     return AfterValidator(check)
 
 
 def _spread_of(given: JsonObject) -> JsonObject:
-    TypeAdapter(ParameterDistribution).validate_python(
-        {name: value for name, value in given.items() if name != "flights"}
-    )
-    TypeAdapter(list[int] | None).validate_python(given.get("flights"))
-    return given
-
-
-def _concise(given: FlightEnd) -> FlightEnd:
-    words = given.remarks if given.request is None else (*given.remarks, given.request.words)
-    if sum(map(len, words)) > _MAX_CHARACTERS:
-        raise ValueError(f"has more than {_MAX_CHARACTERS} characters")
+    spread = {name: value for name, value in given.items() if name != "flights"}
+    _adapter(ParameterDistribution).validate_python(spread)
+    _adapter(list[int] | None).validate_python(given.get("flights"))
     return given
 
 
 class _Strict(Schema):
-    model_config = ConfigDict(extra="forbid", from_attributes=True)
+    """A part of the contents: no other fields, no numbers that are not finite, no endless text."""
+
+    model_config = ConfigDict(extra="forbid", from_attributes=True, allow_inf_nan=False, str_max_length=10_000)
 
     def values_without(self, names: Set[str]) -> dict[str, Any]:
         """The other fields with their values as they came; a dump would change the types of stored numbers."""
         return {name: getattr(self, name) for name in type(self).model_fields.keys() - names}
 
 
+def _known(version: int) -> int:
+    if version > VERSION:
+        found = {"version": version, "newest": VERSION}
+        raise PydanticCustomError(
+            "newer_version", "is {version}, written by a newer Gainline; this version reads up to {newest}", found
+        )
+    return version
+
+
 class Manifest(_Strict):
     """Manifest of a bundle. `parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
-    version: Literal[1, 2, 3, 4, 5, 6]
+    version: Annotated[int, Field(strict=True, ge=1), AfterValidator(_known)]
     program: ShortText
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
@@ -100,7 +97,7 @@ class Record(_Strict):
     codec: Literal[1]
     columns: Annotated[list[ShortText], Field(min_length=2, max_length=64)]
     samples: Annotated[int, Field(ge=1, le=1_000_000)]
-    duration_s: Finite
+    duration_s: float
     source: ShortText
     clock: ShortText
     checksum: Digest
@@ -113,40 +110,24 @@ class Photo(_Strict):
     added_at: AwareDatetime
 
 
-class Trial(_Strict):
+class Trial(TrialFacts, _Strict):
     """A trial as in the database. `proposal` is an index into the campaign's proposals, from 0; without one,
     `predicted` is the trial's own predicted curve."""
 
     number: Annotated[int, Field(ge=1, le=2**31)]
-    state: TrialState
-    kind: TrialKind
     gains: Gains
     read_back: Gains | None
     proposal: Annotated[int, Field(ge=0)] | None
-    predicted_error: Finite | None
     predicted_interval: Annotated[JsonObject, _fits(Interval)] | None
-    predicted: Record | None = None
+    predicted: Record | None
     gate: Annotated[JsonObject, _fits(Gate)]
     record: Record | None
-    error: Finite | None
-    overshoot_m: Finite | None
-    rise_time_s: Finite | None = None
-    settling_time_s: Finite | None = None
-    steady_state_error_m: Finite | None = None
-    curve: Annotated[list[tuple[Finite, Finite]], Field(max_length=5000)] | None
+    curve: Annotated[list[tuple[float, float]], Field(max_length=5000)] | None
     ending: Ending | None
-    end: Annotated[FlightEnd, AfterValidator(_concise)] | None = None
-    abort_cause: AbortCause | None = None
     settings: Options
-    reason: Sentence
-    note: Sentence
-    overrule_reason: Sentence
     glitches: list[Annotated[JsonObject, _fits(Glitch)]] | None
-    repaired_error: Finite | None
-    landing_battery_v: Finite | None
+    landing_battery_v: float | None
     seed: Count
-    created_at: AwareDatetime
-    flown_at: AwareDatetime | None
     photos: Annotated[list[Photo], Field(max_length=100)]
     telemetry: Part | None
 
@@ -163,7 +144,7 @@ class Proposal(_Strict):
     history_digest: Digest
     kind: ProposalKind
     gains: Gains
-    predicted_error: Finite | None
+    predicted_error: float | None
     predicted: Record | None
     explanation: Annotated[JsonObject, _fits(Explanation)]
     gate: Annotated[JsonObject, _fits(Gate)]
@@ -192,11 +173,11 @@ class Campaign(_Strict):
     name: Name
     state: CampaignState
     outcome: Outcome | None
-    stop_reason: Sentence
+    stop_reason: str
     definition: Annotated[JsonObject, _fits(Definition)]
     definition_digest: Digest | None
     safe_gains: Gains | None
-    open_until_flight: Annotated[int, Field(ge=0, le=10_000)] = 0
+    open_until_flight: Annotated[int, Field(ge=0, le=10_000)]
     vehicle: Vehicle
     vehicle_options: Options
     created_at: AwareDatetime

@@ -17,7 +17,6 @@ from app.bundles.contents import (
     FORMAT,
     MANIFEST,
     MAX_CAMPAIGNS,
-    VERSION,
     Campaign,
     Contents,
     Manifest,
@@ -27,12 +26,13 @@ from app.bundles.contents import (
     Trial,
     Vehicle,
 )
+from app.bundles.earlier_versions import VERSION
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
-from app.common.data_folder import log_of_trial, telemetry_log
+from app.campaigns.trials.records import telemetry_log_of
 from app.common.errors import BusyError, ConflictError, StorageError
-from app.db.models import CampaignRow, FlightRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
+from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.trajectories import is_intact, refused_for
 from app.db.types import utc_now
 from app.fleet.registration import origin_of
@@ -97,8 +97,6 @@ class Packer:
         wanted = select(ProposalRow).where(ProposalRow.campaign_id == row.id).order_by(ProposalRow.id)
         proposals = self._session.scalars(wanted).all()
         places = {proposal.id: place for place, proposal in enumerate(proposals)}
-        flown = select(FlightRow.trial_id, FlightRow.id).where(FlightRow.campaign_id == row.id).order_by(FlightRow.id)
-        flights = dict(self._session.execute(flown).all())
         photos: dict[int, list[TrialPhotoRow]] = {}
         for photo, _ in photos_of_campaign(self._session, row.id):
             photos.setdefault(photo.trial_id, []).append(photo)
@@ -109,37 +107,26 @@ class Packer:
                 Trial.view_of(
                     trial,
                     proposal=None if trial.proposal_id is None else places.get(trial.proposal_id),
-                    record=self._flown(trial),
-                    predicted=self._predicted(trial.predicted, f"flight {trial.number}", row.id),
+                    record=self._record(trial.trajectory, refused_for((trial,), "The bundle was not created")),
+                    predicted=self._record(trial.predicted, _damaged_curve(f"flight {trial.number}", row)),
                     photos=[self._photo(trial, photo) for photo in photos.get(trial.id, [])],
-                    telemetry=self._telemetry(trial, flights.get(trial.id)),
+                    telemetry=self._telemetry(trial),
                 )
                 for trial in history.trials_of(self._session, row.id)
             ],
             proposals=[
                 Proposal.view_of(
-                    proposal, predicted=self._predicted(proposal.predicted, f"proposal {proposal.id}", row.id)
+                    proposal, predicted=self._record(proposal.predicted, _damaged_curve(f"proposal {proposal.id}", row))
                 )
                 for proposal in proposals
             ],
         )
 
-    def _predicted(self, row: TrajectoryRow | None, whose: str, campaign_id: int) -> Record | None:
-        if row is not None and not is_intact(row):
-            raise StorageError(
-                f"The bundle was not created: the predicted curve of {whose} of campaign {campaign_id} is damaged.",
-                hint="Restore the database from an earlier backup.",
-            )
-        return self._record(row)
-
-    def _flown(self, row: TrialRow) -> Record | None:
-        if row.trajectory is not None and not is_intact(row.trajectory):
-            raise refused_for((row,), "The bundle was not created")
-        return self._record(row.trajectory)
-
-    def _record(self, row: TrajectoryRow | None) -> Record | None:
+    def _record(self, row: TrajectoryRow | None, damaged: StorageError) -> Record | None:
         if row is None:
             return None
+        if not is_intact(row):
+            raise damaged
         part = self._write(f"records/{row.id}.zst", row.data)
         self._session.expire(row, ["data"])
         return Record.view_of(row, part=part, codec=1)
@@ -155,12 +142,8 @@ class Packer:
         self._session.expire(row, ["data"])
         return Photo.view_of(row, part=part)
 
-    def _telemetry(self, row: TrialRow, flight: int | None) -> str | None:
-        """Telemetry log of the trial's last flight, or the one imported with an earlier bundle."""
-        logs = [log_of_trial(self._data_dir, row.id)]
-        if flight is not None:
-            logs.insert(0, telemetry_log(self._data_dir, flight))
-        found = next((log for log in logs if log.is_file()), None)
+    def _telemetry(self, row: TrialRow) -> str | None:
+        found = telemetry_log_of(self._session, row.id, self._data_dir)
         return None if found is None else self._write(f"telemetry/{row.id}.tlog", found.read_bytes(), squeeze=True)
 
 
@@ -171,6 +154,13 @@ def _vehicle(row: VehicleRow) -> Vehicle:
         return described
     kind, name = origin
     return described.model_copy(update={"kind": kind, "name": name, "registered": True})
+
+
+def _damaged_curve(whose: str, campaign: CampaignRow) -> StorageError:
+    return StorageError(
+        f"The bundle was not created: the predicted curve of {whose} of campaign {campaign.id} is damaged.",
+        hint="Restore the database from an earlier backup.",
+    )
 
 
 def _digest(data: bytes) -> str:

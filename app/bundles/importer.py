@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from app.autopilots.registry import EXPERIMENTS
 from app.bundles.contents import CONTENTS, Campaign, Record, Trial
-from app.bundles.reader import Bundle, trajectory_row
+from app.bundles.reader import Bundle, refusal, trajectory_row
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import core_definition
@@ -16,7 +16,7 @@ from app.campaigns.proposals import is_stale, request_proposal
 from app.campaigns.schemas import Campaign as CampaignView
 from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
-from app.common.errors import ConflictError, InputError, Problem
+from app.common.errors import ConflictError, Problem
 from app.core.tuning.definition_checks import problems_of
 from app.db.base import added
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
@@ -29,6 +29,7 @@ from app.vehicles.registry import VEHICLE_KINDS, check_options
 _SET_HERE: Final = {"id", "name", "definition", "safe_gains", "vehicle", "vehicle_options", "trials", "proposals"}
 """Fields of a campaign that are not stored as they came."""
 _AT_ONCE_BYTES: Final = 16 * 2**20
+_OTHER_VERSION: Final = "Import it with the version of Gainline that wrote it, or update this installation."
 
 
 def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[int, int]) -> CampaignRow:
@@ -52,14 +53,17 @@ def _definition(where: str, source: JsonObject, new_ids: Mapping[int, int]) -> J
     """The definition with the new id of the campaign that it starts from."""
     donor = (source.get("start") or {}).get("donor")
     if donor is not None and donor["campaign_id"] not in new_ids:
-        raise _refused(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle")
+        raise refusal(
+            Problem(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle"),
+            hint=_OTHER_VERSION,
+        )
     if donor is not None:
         source = {
             **source,
             "start": {**source["start"], "donor": {**donor, "campaign_id": new_ids[donor["campaign_id"]]}},
         }
     if wrong := problems_of(core_definition(Definition.model_validate(source)), EXPERIMENTS):
-        raise _refused(f"{where}.definition.{wrong[0].field}", wrong[0].reason)
+        raise refusal(Problem(f"{where}.definition.{wrong[0].field}", wrong[0].reason), hint=_OTHER_VERSION)
     return source
 
 
@@ -73,7 +77,9 @@ def _vehicle(session: Session, where: str, source: Campaign) -> tuple[VehicleRow
         )
         return row, {}
     if vehicle.kind not in VEHICLE_KINDS:
-        raise _refused(f"{where}.vehicle.kind", f"{vehicle.kind!r} is not supported by this version")
+        raise refusal(
+            Problem(f"{where}.vehicle.kind", f"{vehicle.kind!r} is not supported by this version"), hint=_OTHER_VERSION
+        )
     options = check_options(vehicle.kind, source.vehicle_options, field=f"{where}.vehicle")
     choice = VehicleChoice(kind=vehicle.kind, options=options)
     return fleet.chosen_vehicle(session, choice, default_gains=vehicle.safe_gains), options
@@ -121,14 +127,6 @@ def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> N
 
 def _record(bundle: Bundle, source: Record | None) -> TrajectoryRow | None:
     return None if source is None else trajectory_row(source, bundle.part(source.part))
-
-
-def _refused(field: str, reason: str) -> InputError:
-    return InputError(
-        "This bundle cannot be imported; nothing was stored.",
-        problems=(Problem(field, reason),),
-        hint="Import it with the version of Gainline that wrote it, or update this installation.",
-    )
 
 
 def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignView:

@@ -9,8 +9,6 @@ import json
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
 from io import SEEK_END
 from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
 
@@ -19,11 +17,11 @@ import zstandard
 from pydantic import BaseModel, ValidationError
 
 from app.autopilots.registry import EXPERIMENTS
-from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Record
+from app.bundles.contents import CONTENTS, MANIFEST, Campaign, Contents, Manifest, Record
+from app.bundles.earlier_versions import VERSION, bring_up_to_date
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
-from app.db.earlier_ends import give_end
 from app.db.models import TrajectoryRow
 from app.db.trajectories import unpack
 
@@ -44,32 +42,8 @@ _IN_MEMORY_BYTES: Final = 64 * 2**20
 _METHODS: Final = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 _ENCRYPTED: Final = 0x1
 _WIDTH: Final = 4
-_WITH_ENDS: Final = 6
-"""First version with the ends of flights as codes."""
 
 M = TypeVar("M", bound=BaseModel)
-
-
-class _Unpacked:
-    """Checked parts in a temporary file, so that the transaction that stores them only has to read them."""
-
-    def __init__(self) -> None:
-        self._file = tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES, prefix="gainline-bundle-")  # noqa: SIM115  # until `close`
-        self._places: dict[str, tuple[int, int]] = {}
-
-    def keep(self, name: str, data: bytes) -> None:
-        self._places[name] = self._file.seek(0, SEEK_END), len(data)
-        self._file.write(data)
-
-    def get(self, name: str) -> bytes | None:
-        """The part's data; None if it was not kept."""
-        if (place := self._places.get(name)) is None:
-            return None
-        self._file.seek(place[0])
-        return self._file.read(place[1])
-
-    def close(self) -> None:
-        self._file.close()
 
 
 class _Opening:
@@ -100,14 +74,16 @@ class Bundle:
                 "file", "is not a zip file" if "not a zip" in str(error) else f"cannot be read as a zip file: {error}"
             )
         self._look_at_directory()
-        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest, look=_version)
+        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest)
         listed = self.manifest.parts.keys() | {MANIFEST}
         if odd := sorted(listed ^ set(self._zip.namelist())):
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip differ: {odd[0][:80]!r}")
-        tells_ends = self.manifest.version < _WITH_ENDS
         contents = self._listed(CONTENTS, MAX_JSON_BYTES)
-        self.contents = _parsed(CONTENTS, contents, Contents, look=_give_ends if tells_ends else None)
-        self._unpacked = _Unpacked()  # last, because a refused bundle must have nothing to close
+        self.contents = _parsed(CONTENTS, contents, Contents, version=self.manifest.version)
+        # Checked parts, so that the transaction that stores them only reads them. Made last, because a refused bundle
+        # must have nothing to close.
+        self._unpacked = tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES, prefix="gainline-bundle-")  # noqa: SIM115
+        self._places: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -118,11 +94,13 @@ class Bundle:
 
     def part(self, name: str, limit: int = MAX_PART_BYTES) -> bytes:
         """Data of a part. Raises InputError when it is missing, too large, or does not match the manifest."""
-        if (kept := self._unpacked.get(name)) is not None:
-            return kept
-        data = self._listed(name, limit)
-        self._unpacked.keep(name, data)
-        return data
+        if name not in self._places:
+            data = self._listed(name, limit)
+            self._places[name] = self._unpacked.seek(0, SEEK_END), len(data)
+            self._unpacked.write(data)
+        start, size = self._places[name]
+        self._unpacked.seek(start)
+        return self._unpacked.read(size)
 
     def check(self) -> None:
         """Check every record and photo: checksums, sizes, types. Raises InputError that names the first invalid one."""
@@ -157,19 +135,21 @@ class Bundle:
     def _look_at_directory(self) -> None:
         infos = self._zip.infolist()
         names = [info.filename for info in infos]
-        if len(infos) > MAX_PARTS:
-            _refuse("file", f"has {len(infos)} parts; at most {MAX_PARTS} are allowed")
-        if len(set(names)) < len(names):
-            _refuse("file", "has two parts with the same name")
-        if MANIFEST not in names:
-            _refuse(MANIFEST, "is missing: this zip was not written by Gainline")
-        for info in infos:
-            if info.flag_bits & _ENCRYPTED or info.compress_type not in _METHODS:
-                _refuse(info.filename[:80], "is encrypted, or compressed with an unsupported method")
-        if (total := sum(info.file_size for info in infos)) > MAX_TOTAL_BYTES:
-            _refuse(
-                "file", f"would unpack to {total / 2**30:.1f} GiB; at most {MAX_TOTAL_BYTES / 2**30:g} GiB is allowed"
-            )
+        total = sum(info.file_size for info in infos)
+        limits = f"would unpack to {total / 2**30:.1f} GiB; at most {MAX_TOTAL_BYTES / 2**30:g} GiB is allowed"
+        foreign = "is encrypted, or compressed with an unsupported method"
+        for is_wrong, field, reason in (
+            (len(infos) > MAX_PARTS, "file", f"has {len(infos)} parts; at most {MAX_PARTS} are allowed"),
+            (len(set(names)) < len(names), "file", "has two parts with the same name"),
+            (MANIFEST not in names, MANIFEST, "is missing: this zip was not written by Gainline"),
+            *(
+                (info.flag_bits & _ENCRYPTED or info.compress_type not in _METHODS, info.filename[:80], foreign)
+                for info in infos
+            ),
+            (total > MAX_TOTAL_BYTES, "file", limits),
+        ):
+            if is_wrong:
+                _refuse(field, reason)
 
     def _read(self, name: str, limit: int) -> bytes:
         """Read a part; never unpacks more than `limit` + 1 bytes, whatever the directory states."""
@@ -231,20 +211,8 @@ def _once(used: set[str], field: str, part: str) -> str:
     return part
 
 
-def _version(document: object) -> None:
-    if isinstance(document, dict) and isinstance(found := document.get("version"), int) and found > VERSION:
-        _refuse(f"{MANIFEST}: version", f"is {found}, written by a newer Gainline; this version reads up to {VERSION}")
-
-
-def _give_ends(document: Any) -> None:
-    """Give trials the ends that their reasons tell. Whatever is malformed is refused afterwards."""
-    with suppress(AttributeError, KeyError, TypeError):
-        for campaign in document["campaigns"]:
-            for trial in campaign["trials"]:
-                give_end(trial)
-
-
-def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], None] | None = None) -> M:
+def _parsed(name: str, data: bytes, kind: type[M], *, version: int = VERSION) -> M:
+    """The part as what it should be, in a bundle of that version."""
     if (values := sum(map(data.count, (b",", b"[", b"{")))) > MAX_VALUES:
         _refuse(
             name, f"contains about {values / 1e6:.0f} million values; at most {MAX_VALUES / 1e6:g} million are allowed"
@@ -253,14 +221,13 @@ def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], N
         document: Any = json.loads(data, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         _refuse(name, f"is not JSON: {error}")
-    if look is not None:
-        look(document)
+    bring_up_to_date(document, version)
     try:
         return kind.model_validate(document)
     except (ValidationError, RecursionError) as error:
         found = error.errors()[:10] if isinstance(error, ValidationError) else []
         problems = tuple(Problem(f"{name}: {'.'.join(map(str, each['loc']))}", each["msg"]) for each in found)
-        raise _refusal(problems or (Problem(name, "is nested too deeply"),)) from error
+        raise refusal(*(problems or (Problem(name, "is nested too deeply"),))) from error
 
 
 def _no_number(text: str) -> NoReturn:
@@ -268,12 +235,14 @@ def _no_number(text: str) -> NoReturn:
 
 
 def _refuse(field: str, reason: str) -> NoReturn:
-    raise _refusal((Problem(field, reason),))
+    raise refusal(Problem(field, reason))
 
 
-def _refusal(problems: tuple[Problem, ...]) -> InputError:
-    return InputError(
-        "This bundle cannot be imported; nothing was stored.",
-        problems=problems,
-        hint="Export the bundle again from the installation that has the campaign, and import that file unchanged.",
-    )
+_UNCHANGED: Final = (
+    "Export the bundle again from the installation that has the campaign, and import that file unchanged."
+)
+
+
+def refusal(*problems: Problem, hint: str = _UNCHANGED) -> InputError:
+    """Error of a bundle that cannot be imported."""
+    return InputError("This bundle cannot be imported; nothing was stored.", problems=problems, hint=hint)

@@ -220,10 +220,8 @@ def override(
         )
     if gains:
         chosen[("gains",)] = [_gains(text, file.definition.experiment, "--gains") for text in gains]
-    if seed is not None:
-        chosen[("definition", "seed")] = seed
-    if max_flights is not None:
-        chosen[("definition", "stop", "max_flights")] = max_flights
+    numbers = {("definition", "seed"): seed, ("definition", "stop", "max_flights"): max_flights}
+    chosen |= {path: number for path, number in numbers.items() if number is not None}
     changed = with_settings(file, chosen)
     return with_settings(changed, _assignments(changed, settings)) if settings else changed
 

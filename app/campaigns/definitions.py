@@ -4,7 +4,7 @@ start, a flight of another campaign, looked up when the campaign is defined.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Final
 
@@ -20,7 +20,7 @@ from app.common.states import TrialState
 from app.core.definition import Definition, problems_of_options
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
-from app.core.tuning.definition_checks import check_definition, highest_set_point_m
+from app.core.tuning.definition_checks import highest_set_point_m, problems_of
 from app.core.tuning.evidence import Evidence
 from app.db.models import CampaignRow, TrialRow
 from app.db.types import JsonObject
@@ -94,17 +94,13 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
             hint="Remove the donor, or set start.kind to 'campaign'.",
         )
     definition = core_definition(asked)
+    problems = [Problem(f"definition.{each.field}", each.reason) for each in problems_of(definition, EXPERIMENTS)]
     options: dict[str, OptionValue] = {}
-
-    def take_options() -> None:
-        if vehicle.id is None:
-            options.update(check_options(vehicle.kind, vehicle.options, field="vehicle"))
-
-    problems = [
-        *_refusals(lambda: check_definition(definition, EXPERIMENTS), "definition."),
-        *_refusals(take_options, ""),
-        *_mismatch(definition, vehicle.kind, options),
-    ]
+    try:
+        options |= check_options(vehicle.kind, vehicle.options, field="vehicle") if vehicle.id is None else {}
+    except InputError as error:
+        problems += error.problems
+    problems += _mismatch(definition, vehicle.kind, options)
     if problems:
         raise InputError(
             "Invalid campaign.",
@@ -135,14 +131,6 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
             f"must be lower by {excess_m:g} m, or the steps smaller: a vehicle of this kind flies "
             f"to at most {described.highest_set_point_m:g} m",
         )
-
-
-def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:
-    try:
-        check()
-    except InputError as error:
-        return [Problem(prefix + problem.field, problem.reason) for problem in error.problems]
-    return []
 
 
 def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:

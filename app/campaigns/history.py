@@ -6,10 +6,11 @@ import hashlib
 import json
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Final, Literal
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
-from sqlalchemy import func, select
+from sqlalchemy import Row, func, select
 from sqlalchemy.orm import Session, defer
 
 from app.autopilots.registry import experiment_of
@@ -45,6 +46,11 @@ FLOWN: Final = frozenset(
     {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
 )
 """States of trials that have left the ground."""
+_TOLD_BY_A_FLIGHT: Final = (
+    *(TrialRow.number, TrialRow.gains, TrialRow.error, TrialRow.state, TrialRow.abort_cause),
+    *(TrialRow.predicted_error, TrialRow.predicted_interval),
+)
+"""What the core learns of a trial beside its record and settings."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -93,14 +99,8 @@ def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight |
         return None
     record = trajectory_of(session, rows[0].trajectory.id)
     error = experiment.error(record, accept_gaps=True)
-    return Flight(
-        number=rows[0].number,
-        gains=rows[0].gains,
-        trajectory=record,
-        error=error,
-        outcome="valid",
-        parameters=_numbers(rows[0].settings),
-    )
+    as_flown = _flight(rows[0], record, _numbers(rows[0].settings))
+    return replace(as_flown, error=error, outcome="valid", predicted=None, against_gains=True)
 
 
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
@@ -110,13 +110,9 @@ def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The scored flights in their order, with gains and errors only, so that many are read quickly."""
-    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
-        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
-    )
-    return tuple(
-        Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
-        for number, gains, error in session.execute(wanted.order_by(TrialRow.number))
-    )
+    scored = TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
+    found = session.execute(select(*_TOLD_BY_A_FLIGHT).where(*scored).order_by(TrialRow.number))
+    return tuple(_flight(row, _NOTHING, {}) for row in found)
 
 
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
@@ -143,7 +139,9 @@ def history_digest(session: Session, campaign: CampaignRow, definition: Definiti
     """
     checksums = repository.checksums(session, campaign.id)
     rows = in_history(trials)
-    parameters = _loop_parameters(session, definition, rows)
+    modelled = experiment_of(definition).modelled
+    settings = {} if modelled is None else repository.settings(session, [row.id for row in rows])
+    parameters = {row_id: modelled.loop_parameters(_numbers(found)) for row_id, found in settings.items() if modelled}
     flights = [
         [
             row.number,
@@ -162,17 +160,6 @@ def history_digest(session: Session, campaign: CampaignRow, definition: Definiti
     reopened = [] if not campaign.open_until_flight else [["open until flight", campaign.open_until_flight]]
     content = json.dumps([definition.digest(), flights, *battery, *reopened], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
-
-
-def _loop_parameters(
-    session: Session, definition: Definition, rows: Sequence[TrialRow]
-) -> Mapping[int, Mapping[str, float]]:
-    """The parameters of each flight on which the model depends, by trial id."""
-    modelled = experiment_of(definition).modelled
-    if modelled is None:
-        return {}
-    settings = repository.settings(session, [row.id for row in rows])
-    return {row_id: modelled.loop_parameters(_numbers(found)) for row_id, found in settings.items()}
 
 
 def flight_under_way(session: Session, campaign_id: int | None = None) -> FlightRow | None:
@@ -210,14 +197,9 @@ def told_prediction(
 ) -> tuple[float | None, Interval | None]:
     """The stored error and interval of a prediction; both None if they say nothing. `corrected`: whether a flight had
     corrected the model before."""
-    interval = (
-        None
-        if stored is None
-        else Interval(lower=stored["lower"], upper=stored["upper"], confidence=stored["confidence"])
-    )
-    if not is_informative(None if interval is None else interval.lower, corrected=corrected):
+    if not is_informative(None if stored is None else stored["lower"], corrected=corrected):
         return None, None
-    return error, interval
+    return error, None if stored is None else Interval(**stored)
 
 
 def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:
@@ -243,15 +225,14 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
         ) from error
 
 
-def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
-    outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
+def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
     interval = row.predicted_interval or {}
     return Flight(
         number=row.number,
         gains=row.gains,
         trajectory=trajectory,
         error=row.error,
-        outcome=outcome,
+        outcome="valid" if row.state == TrialState.VALID else "aborted",
         predicted=None
         if row.predicted_error is None
         else Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper")),
@@ -269,7 +250,7 @@ def _numbers(settings: OptionsJson) -> dict[str, float]:
     }
 
 
-def _is_against_gains(row: TrialRow) -> bool:
+def _is_against_gains(row: TrialRow | Row[*tuple[Any, ...]]) -> bool:
     """Whether an aborted trial counts against its gains; True for every other trial."""
     return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
 

@@ -245,12 +245,12 @@ def _next_action(
 def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> list[str]:
     """Allowed actions: those of the state table, less what an active flight rules out, and deletion once a flight was
     begun."""
-    impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
-    if repository.has_claimed_flight(session, row.id):
-        impossible.add("delete")
-    if repository.rehearsed_id(session, row.id) is not None:
-        impossible.add("reopen")
-    return [action for action in allowed(CAMPAIGN_ACTIONS, row.state) if action not in impossible]
+    ruled_out = (
+        (flight is not None, {"plan", "define", "delete", "finish"}),
+        (repository.has_claimed_flight(session, row.id), {"delete"}),
+        (repository.rehearsed_id(session, row.id) is not None, {"reopen"}),
+    )
+    return allowed(CAMPAIGN_ACTIONS, row.state, ruled_out)
 
 
 def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> Mapping[int, list[SparkCurve]]:

@@ -1,6 +1,6 @@
 """State machines as data: checks of transitions, actions and versions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, TypeVar
@@ -74,9 +74,12 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
         )
 
 
-def allowed(actions: Mapping[str, frozenset[S]], state: S) -> list[str]:
-    """Actions possible in `state`, in the table's order."""
-    return [action for action, states in actions.items() if state in states]
+def allowed(
+    actions: Mapping[str, frozenset[S]], state: S, ruled_out: Iterable[tuple[object, Set[str]]] = ()
+) -> list[str]:
+    """Actions possible in `state`, in the table's order, but for those that a true condition has `ruled_out`."""
+    impossible = {action for applies, without in ruled_out if applies for action in without}
+    return [action for action, states in actions.items() if state in states and action not in impossible]
 
 
 def check_version(sent: int, held: int, what: str, differences: Mapping[str, tuple[object, object]]) -> None:

@@ -1,23 +1,15 @@
-"""What the schemas and pages of several slices share: checked names and numbers, pages and their cursors.
+"""What the schemas of several slices share: checked names and numbers, pages, problems.
 
 A name must not contain control characters: they can rewrite a terminal's lines, or reverse text so that one name looks
-like another. A cursor is the position where a page ended, so that the next page begins there whatever was added or
-changed meanwhile.
+like another.
 """
 
-import base64
-import binascii
-import json
 import unicodedata
-from datetime import datetime
 from pathlib import PurePath
 from typing import Annotated, Final, Generic, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
-
-from app.common.errors import InputError
-from app.common.errors import Problem as FieldProblem
 
 _REORDERING: Final = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u2028\u2029")
 """Marks, embeddings, overrides and isolates (Unicode Standard Annex 9), and separators of lines and paragraphs."""
@@ -151,48 +143,3 @@ class Gate(Schema):
 
     passed: bool
     checks: list[Check]
-
-
-Position = tuple[str | float, int]
-"""The sort value of a page's last item, and its id, which decides among equal values."""
-_LARGEST_ID: Final = 2**63 - 1
-
-
-def encode_cursor(order: str, position: Position) -> str:
-    """Encode a position as text for a URL; the sort order is included, because the position is valid only in that
-    order."""
-    return base64.urlsafe_b64encode(json.dumps([order, *position]).encode()).decode().rstrip("=")
-
-
-def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Position:
-    """Decode a cursor. Raises InputError unless it is one of this order, with a sort value of this kind."""
-    try:
-        found = json.loads(base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True))
-        cursor_order, value, identity = found
-        value = kind(value) if isinstance(value, int | float | str) and not isinstance(value, bool) else None
-    except (ValueError, TypeError, OverflowError, binascii.Error, RecursionError):
-        raise _refused("is not a cursor of this list") from None
-    if cursor_order != order:
-        raise _refused("belongs to a different sort order of the list")
-    if value is None or type(identity) is not int or not 0 < identity <= _LARGEST_ID:
-        raise _refused("is not a cursor of this list")
-    return value, identity
-
-
-def instant(text: str | float) -> datetime:
-    """Convert a sort value to a time. Raises InputError when it is not one."""
-    try:
-        when = datetime.fromisoformat(str(text))
-    except ValueError:
-        raise _refused("is not a cursor of this list") from None
-    if when.tzinfo is None:
-        raise _refused("is not a cursor of this list")
-    return when
-
-
-def _refused(reason: str) -> InputError:
-    return InputError(
-        "There is no such page of the list.",
-        problems=(FieldProblem("cursor", reason),),
-        hint="Start without a cursor, and send `next_cursor` unchanged.",
-    )

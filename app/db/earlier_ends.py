@@ -95,22 +95,18 @@ def _request(words: str = "", *, by: str = "operator", motors_off: bool = False)
     return {"words": words, "motors_off": motors_off, "by": by}
 
 
-def is_recognised(end: Mapping[str, Any]) -> bool:
-    return end["failure"] is not None or end["request"] is not None
-
-
 def landing_of(settings: Mapping[str, Any]) -> str:
     """Earlier versions noted among the settings that a landing was not observed."""
     return "landed" if settings.get("landed", True) else "unknown"
 
 
-def give_end(trial: dict[str, Any]) -> None:
+def give_end(trial: dict[str, Any], *, was_flown: bool = False) -> None:
     """Give a trial of an earlier version, without the flight that was its last, the end that its reason tells. A reason
-    that is not recognised stays, because a person may have given it."""
+    that is not recognised stays, because a person may have given it; what `was_flown` has an end all the same."""
     landed = landing_of(trial["settings"])
     on_request = trial["state"] == "aborted" and trial.get("abort_cause") in _REQUESTED
     end = read_end("" if trial["state"] == "valid" else trial["reason"], on_request=on_request, landed=landed)
-    if is_recognised(end):
+    if end["failure"] is not None or end["request"] is not None:
         trial["end"], trial["reason"] = end, ""
-    elif landed != "landed":
+    elif was_flown or landed != "landed":
         trial["end"] = end | {"remarks": []}

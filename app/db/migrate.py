@@ -22,25 +22,19 @@ if TYPE_CHECKING:
 _APP: Final = Path(__file__).resolve().parent.parent
 
 
-def _unheard(_line: str) -> None:
-    """Tell nobody."""
-
-
-def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> None:
+def migrate(database_file: Path, announce: Callable[[str], None] = lambda _line: None) -> None:
     """Create the database, or migrate it to the program's revision; nothing is changed when that fails. `announce` gets
     a line at the beginning, and of a migration one after each revision.
 
     Raises SchemaError when it was written by a newer program, StorageError when it cannot be opened or written.
     """
     prepare_data_dir(database_file.parent)
-    held = revision_of(database_file)
+    held = _known_revision_of(database_file)
     if held == REVISION:
         return
-    known = _known_revisions()
-    if held is not None and held not in known:
-        raise _newer(database_file, held)
     from alembic import command
 
+    known = _known_revisions()
     number, total = count(1), sum(each > (held or "") for each in known)
     announce("Creating the database" if held is None else f"Migrating the database from revision {held} to {REVISION}")
 
@@ -66,15 +60,11 @@ def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> 
 
 def require_current(database_file: Path) -> None:
     """Raise SchemaError, with the command to run, unless the database is at the program's revision."""
-    held = revision_of(database_file)
-    if held == REVISION:
-        return
-    if held is not None and held not in _known_revisions():
-        raise _newer(database_file, held)
-    raise SchemaError(
-        f"The database {database_file} is at revision {held or 'none'}, not {REVISION}.",
-        hint="Run `gainline serve` to migrate it, or `alembic upgrade head` in a checkout.",
-    )
+    if (held := _known_revision_of(database_file)) != REVISION:
+        raise SchemaError(
+            f"The database {database_file} is at revision {held or 'none'}, not {REVISION}.",
+            hint="Run `gainline serve` to migrate it, or `alembic upgrade head` in a checkout.",
+        )
 
 
 def revision_of(database_file: Path) -> str | None:
@@ -101,8 +91,12 @@ def _config() -> "Config":
     return config
 
 
-def _newer(database_file: Path, revision: str) -> SchemaError:
-    return SchemaError(
-        f"The database {database_file} was written by a newer Gainline (revision {revision}).",
-        hint="Start that version, or choose another data folder with --data-dir.",
-    )
+def _known_revision_of(database_file: Path) -> str | None:
+    """The database's revision; None for an empty one. Raises SchemaError for one of a newer program."""
+    held = revision_of(database_file)
+    if held not in {None, REVISION} and held not in _known_revisions():
+        raise SchemaError(
+            f"The database {database_file} was written by a newer Gainline (revision {held}).",
+            hint="Start that version, or choose another data folder with --data-dir.",
+        )
+    return held

@@ -27,7 +27,13 @@ from app.db.types import GainsJson, JsonObject, OptionsJson, utc_now
 from app.vehicles.flight_end import FlightEnd
 
 
-class VehicleRow(Base, Reported):
+class _Dated:
+    """A row that knows since when it is there."""
+
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+
+class VehicleRow(Base, Reported, _Dated):
     """Something that can fly a trial.
 
     A simulation's row is created by the first campaign that uses its kind, and shared; its settings are in each
@@ -60,10 +66,18 @@ class VehicleRow(Base, Reported):
     operator: Mapped[str | None]
     operator_token_hash: Mapped[str | None]
     operator_until: Mapped[datetime | None]
-    created_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-class VehicleActRow(Base, Reported):
+class _Requested(Reported):
+    """A row that asks something of a vehicle, which a worker claims."""
+
+    worker: Mapped[str | None]
+    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
+    claimed_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+
+class VehicleActRow(Base, _Requested):
     """An act: a request to a registered vehicle beside its flights, who made it and why, and the vehicle's answer.
 
     Written before anything is sent; except for land and motors off, which are sent at once and recorded afterwards.
@@ -91,10 +105,6 @@ class VehicleActRow(Base, Reported):
     read_back: Mapped[GainsJson | None]
     result: Mapped[JsonObject | None]
     problem: Mapped[str] = mapped_column(default="")
-    worker: Mapped[str | None]
-    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
-    claimed_at: Mapped[datetime | None]
-    finished_at: Mapped[datetime | None]
 
     vehicle: Mapped[VehicleRow] = relationship()
 
@@ -102,7 +112,7 @@ class VehicleActRow(Base, Reported):
         return "vehicle", self.vehicle_id, None
 
 
-class CampaignRow(Base, Reported):
+class CampaignRow(Base, Reported, _Dated):
     """One vehicle, one experiment, one strategy.
 
     `version` counts people's edits. `safe_gains` are the vehicle's at the first flight, after which they are part of
@@ -132,7 +142,6 @@ class CampaignRow(Base, Reported):
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
     vehicle_options: Mapped[OptionsJson]
     parent_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="SET NULL"), index=True)
-    created_at: Mapped[datetime] = mapped_column(default=utc_now)
     updated_at: Mapped[datetime] = mapped_column(default=utc_now, onupdate=utc_now)
 
     vehicle: Mapped[VehicleRow] = relationship(lazy="joined", innerjoin=True)
@@ -150,7 +159,7 @@ class RehearsalRow(Base):
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
 
 
-class TrajectoryRow(Base, Numbered):
+class TrajectoryRow(Base, Numbered, _Dated):
     """One recorded or predicted flight, packed by `app.db.trajectories`. Written once; the database refuses changes."""
 
     __tablename__ = "trajectory"
@@ -163,10 +172,9 @@ class TrajectoryRow(Base, Numbered):
     clock: Mapped[str]
     checksum: Mapped[str]
     data: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
-    created_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-class TrialRow(Base, Reported):
+class TrialRow(Base, Reported, _Dated):
     """One flight of one policy.
 
     `predicted_error` and `predicted_interval` are those with which it was planned; of a trial without a proposal,
@@ -216,7 +224,6 @@ class TrialRow(Base, Reported):
     repaired_error: Mapped[float | None]
     landing_battery_v: Mapped[float | None]
     seed: Mapped[int]
-    created_at: Mapped[datetime] = mapped_column(default=utc_now)
     flown_at: Mapped[datetime | None]
 
     campaign: Mapped[CampaignRow] = relationship()
@@ -254,7 +261,7 @@ class ControllerCheckRow(Base, Reported):
     checked_at: Mapped[datetime] = mapped_column(default=utc_now)
 
 
-class FlightRow(Base, Reported):
+class FlightRow(Base, _Requested):
     """One request to a vehicle, written before it is sent, and what the vehicle answered.
 
     A flight of mode `stage` waits with its gains on the vehicle until an operator sets `take_off_at`, or `stand_down`
@@ -293,11 +300,7 @@ class FlightRow(Base, Reported):
     battery_v_before: Mapped[float | None]
     battery_v_after: Mapped[float | None]
     speed: Mapped[float | None]
-    worker: Mapped[str | None]
     end: Mapped[FlightEnd | None]
-    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
-    claimed_at: Mapped[datetime | None]
-    finished_at: Mapped[datetime | None]
 
     campaign: Mapped[CampaignRow] = relationship()
     trial: Mapped[TrialRow] = relationship()
@@ -327,7 +330,7 @@ class ProposalRow(Base, Reported):
     predicted: Mapped[TrajectoryRow | None] = relationship()
 
 
-class JobRow(Base, Reported):
+class JobRow(Base, Reported, _Dated):
     """Numeric work: queued, running or done.
 
     `order` describes the work, `done_share` (0 … 1) and `doing` the progress. `result` is loaded only on
@@ -349,7 +352,6 @@ class JobRow(Base, Reported):
     attempts: Mapped[int] = mapped_column(default=0)
     worker: Mapped[str | None]
     lease_until: Mapped[datetime | None]
-    created_at: Mapped[datetime] = mapped_column(default=utc_now)
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 

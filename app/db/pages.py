@@ -1,19 +1,28 @@
-"""Pages of a list: the rows that follow the position where the page before ended."""
+"""Pages of a list: the rows that follow the position where the page before ended.
 
+A cursor is that position, so that the next page begins there whatever was added or changed meanwhile.
+"""
+
+import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Any, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
+from pydantic import AwareDatetime, Field, TypeAdapter
+from pydantic_core import to_json
 from sqlalchemy import ColumnElement, Select, String, func, literal, tuple_
 from sqlalchemy.orm import Session
 
-from app.common.schemas import Page, decode_cursor, encode_cursor, instant
+from app.common.errors import InputError, Problem
+from app.common.schemas import Number, Page
 from app.db.base import Reported
 from app.db.types import UtcDateTime
 
 R = TypeVar("R", bound=Reported)
 V = TypeVar("V")
+
+_Id = Annotated[int, Field(gt=0, le=2**63 - 1)]
+_ANY_CURSOR: Final = TypeAdapter(tuple[str, Any, _Id])
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +32,32 @@ class Order:
     name: str
     value: ColumnElement[Any]
     descending: bool = False
+
+    def cursor_at(self, value: object, identity: int) -> str:
+        """The position after the row with this value and id, as text for a URL, with the order, in which alone it is
+        valid."""
+        return base64.urlsafe_b64encode(to_json([self.name, value, identity])).decode().rstrip("=")
+
+    def position_of(self, cursor: str) -> tuple[Any, int]:
+        """The value and id of a cursor. Raises InputError unless it is one of this order."""
+        is_time, is_text = isinstance(self.value.type, UtcDateTime), isinstance(self.value.type, String)
+        kind: Any = AwareDatetime if is_time else str if is_text else Number
+        try:
+            packed = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True)
+            order, _, identity = _ANY_CURSOR.validate_json(packed, strict=True)
+            if order == self.name:
+                return TypeAdapter(tuple[str, kind, _Id]).validate_json(packed, strict=True)[1], identity
+        except ValueError:
+            raise _refused("is not a cursor of this list") from None
+        raise _refused("belongs to a different sort order of the list")
+
+
+def _refused(reason: str) -> InputError:
+    return InputError(
+        "There is no such page of the list.",
+        problems=(Problem("cursor", reason),),
+        hint="Start without a cursor, and send `next_cursor` unchanged.",
+    )
 
 
 def page_of(
@@ -38,16 +73,11 @@ def page_of(
     total = session.scalar(wanted.with_only_columns(func.count(), maintain_column_froms=True)) or 0
     value, identity = order.value, wanted.selected_columns["id"]
     if cursor is not None:
-        is_time = isinstance(value.type, UtcDateTime)
-        at, after_id = decode_cursor(order.name, cursor, str if is_time or isinstance(value.type, String) else float)
-        here = tuple_(value, identity)
-        there = tuple_(literal(instant(at), UtcDateTime()) if is_time else literal(at), literal(after_id))
+        at, after_id = order.position_of(cursor)
+        here, there = tuple_(value, identity), tuple_(literal(at, value.type), literal(after_id))
         wanted = wanted.where(here < there if order.descending else here > there)
     directed = (value.desc(), identity.desc()) if order.descending else (value, identity)
     found = session.execute(wanted.add_columns(value).order_by(*directed).limit(limit + 1)).all()
     rows = [row for row, _ in found[:limit]]
-    following = None
-    if len(found) > limit:
-        last = found[limit - 1][1]
-        following = encode_cursor(order.name, (last.isoformat() if isinstance(last, datetime) else last, rows[-1].id))
+    following = order.cursor_at(found[limit - 1][1], rows[-1].id) if len(found) > limit else None
     return Page(items=view(rows), total=total, next_cursor=following)

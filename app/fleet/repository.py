@@ -8,7 +8,6 @@ from sqlalchemy import ColumnElement, Select, String, and_, delete, func, litera
 from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
-from app.common.schemas import Position, instant
 from app.common.states import (
     ACTIVE_ACT_STATES,
     ACTIVE_FLIGHT_STATES,
@@ -86,8 +85,8 @@ def acts_of(vehicle_id: int) -> Select[VehicleActRow]:
 
 
 def ledger(
-    session: Session, vehicle_id: int, *, before: Position | None, limit: int
-) -> tuple[list[tuple[Line, Position]], int]:
+    session: Session, vehicle_id: int, *, before: tuple[datetime, int] | None, limit: int
+) -> tuple[list[tuple[Line, tuple[datetime, int]]], int]:
     """The newest `limit` + 1 lines before that position, each with its own position; and the total count.
 
     A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
@@ -113,10 +112,10 @@ def ledger(
     total = session.scalar(select(func.count()).select_from(lines)) or 0
     wanted = select(lines).order_by(lines.c.at.desc(), lines.c.rank.desc())
     if before is not None:
-        at = literal(instant(before[0]), UtcDateTime())
+        at = literal(before[0], UtcDateTime())
         wanted = wanted.where(tuple_(lines.c.at, lines.c.rank) < tuple_(at, literal(before[1])))
     found = session.execute(wanted.limit(limit + 1)).all()
-    return [((row.why, row.rank // 2), (row.at.isoformat(), row.rank)) for row in found], total
+    return [((row.why, row.rank // 2), (row.at, row.rank)) for row in found], total
 
 
 def _is_left_with_its_gains() -> ColumnElement[bool]:

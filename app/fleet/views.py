@@ -6,7 +6,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.common.schemas import Page, decode_cursor, encode_cursor
+from app.common.schemas import Page
 from app.common.states import (
     ACTIVE_ACT_STATES,
     ACTIVE_FLIGHT_STATES,
@@ -23,7 +23,7 @@ from app.fleet import repository
 from app.fleet.schemas import GivenGains, VehicleAct
 from app.vehicles.flight_end import end_text
 
-_NEWEST_FIRST: Final = "-at"
+_NEWEST_FIRST: Final = Order("-at", FlightRow.requested_at.expression, descending=True)
 
 
 def _act_view(row: VehicleActRow, flight: FlightRow | None) -> VehicleAct:
@@ -81,7 +81,7 @@ def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleA
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
     """Page of the gain sets that the vehicle was given, newest first. Raises NotFoundError."""
     vehicle = repository.get_one(session, vehicle_id)
-    before = None if cursor is None else decode_cursor(_NEWEST_FIRST, cursor, str)
+    before = None if cursor is None else _NEWEST_FIRST.position_of(cursor)
     found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
     shown = [line for line, _ in found[:limit]]
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
@@ -95,7 +95,7 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
             items.append(_of_restoring(vehicle, flights[identity]))
         else:
             items.append(_of_act(acts[identity]))
-    following = encode_cursor(_NEWEST_FIRST, found[limit - 1][1]) if len(found) > limit else None
+    following = _NEWEST_FIRST.cursor_at(*found[limit - 1][1]) if len(found) > limit else None
     return Page(items=items, total=total, next_cursor=following)
 
 

@@ -18,8 +18,9 @@ from app.campaigns.trials.schemas import Trial
 from app.common.conflict_checks import state_label
 from app.core import formatting
 from app.core.tuning.strategy import Interval
+from app.db.models import TrialPhotoRow
 from app.figures.base import Card, Cell, Column
-from app.reports.service import Photo, Report
+from app.reports.service import Report
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -195,7 +196,7 @@ def _panels(card: Card) -> int:
     return sum(name.startswith("xaxis") for name in layout) if isinstance(layout, Mapping) else 0
 
 
-def _data_uri(photo: Photo) -> Markup:
+def _data_uri(photo: TrialPhotoRow) -> Markup:
     return Markup(f"data:{photo.media_type};base64,{base64.b64encode(photo.data).decode()}")  # noqa: S704  # no markup in it
 
 

@@ -3,6 +3,7 @@ campaign's frozen settings, anomalies in the order of the flights, notes and pho
 still be sent.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -62,21 +63,13 @@ class Anomaly:
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class Photo:
-    """An unmodified photo."""
-
-    media_type: str
-    data: bytes
-    added_at: datetime
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """Remarks on a trial: its note, the photos that fit into the report, and the number of those left out."""
+    """Remarks on a trial: its note, the photos that fit into the report with their pictures loaded, and the number of
+    those left out."""
 
     trial: Trial
-    photos: tuple[Photo, ...]
+    photos: tuple[TrialPhotoRow, ...]
     left_out: int
 
 
@@ -118,55 +111,63 @@ _STARTS: Final = {
 
 def describe_vehicle(
     campaign: Campaign, experiment: Experiment, identity: Identity | None, safe_gains: str
-) -> Iterator[Fact]:
+) -> tuple[Fact, ...]:
     """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
     vehicle = campaign.vehicle
     kind = VEHICLE_KINDS.get(vehicle.kind)
-    yield Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})")
-    yield Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation")
-    if identity is not None:
-        known = f"{identity.autopilot} {identity.version}".strip()
-        hardware = f", hardware id {identity.uid}" if identity.uid else ""
-        yield Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}")
     titled = () if kind is None else [replace(each, title=each.label or each.title) for each in kind.options]
     autopilot = vehicle.options.get("autopilot")
     foreign = {each.name for each in titled if each.autopilots and autopilot not in each.autopilots}
-    yield from _options({name: value for name, value in vehicle.options.items() if name not in foreign}, titled)
-    if vehicle.can_fly:
-        yield Fact("Safe gains", safe_gains)
-    yield Fact("Experiment", experiment.title)
-    yield from _options(with_defaults(campaign.definition.experiment_options, experiment.options), experiment.options)
-    for each in experiment.space.gains:
-        unit = f" ({each.unit})" if each.unit else ""
-        yield Fact(f"Gain {each.name}", f"{each.title}{unit}, {gain(each.lower)} … {gain(each.upper)}")
+    own = {name: value for name, value in vehicle.options.items() if name not in foreign}
+    options = experiment.options
+    return (
+        Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})"),
+        Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation"),
+        *(() if identity is None else (Fact("Autopilot", _autopilot(identity)),)),
+        *_options(own, titled),
+        *((Fact("Safe gains", safe_gains),) if vehicle.can_fly else ()),
+        Fact("Experiment", experiment.title),
+        *_options(with_defaults(campaign.definition.experiment_options, options), options),
+        *(Fact(f"Gain {each.name}", _range_of(each)) for each in experiment.space.gains),
+    )
 
 
-def describe_method(campaign: Campaign, experiment: Experiment) -> Iterator[Fact]:
+def _autopilot(identity: Identity) -> str:
+    known = f"{identity.autopilot} {identity.version}".strip()
+    hardware = f", hardware id {identity.uid}" if identity.uid else ""
+    return f"{known}, system {identity.system_id}{hardware}"
+
+
+def _range_of(one: Gain) -> str:
+    unit = f" ({one.unit})" if one.unit else ""
+    return f"{one.title}{unit}, {gain(one.lower)} … {gain(one.upper)}"
+
+
+def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:
     """Strategy, start, bounds and stop rule, each with its settings."""
     definition = campaign.definition
     strategy = STRATEGIES.get(definition.strategy)
-    yield Fact("Strategy", definition.strategy if strategy is None else strategy.title)
-    yield from _options(definition.options, () if strategy is None else strategy.options)
-    yield Fact("Start", _start(definition.start))
-    for name, (low, high) in definition.bounds.items():
-        yield Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}")
     first, later = short_percent(definition.first_step_fraction), short_percent(definition.step_fraction)
-    yield Fact("Maximum step", f"{first} of each gain's range until a flight is valid, then {later}")
-    if experiment.output == "altitude_m":
-        yield Fact("Gate ceiling", f"{definition.ceiling_m:g} m")
-    yield Fact("Stop rule", _stop(definition.stop, campaign.open_until_flight))
-    if campaign.vehicle.can_fly and not campaign.vehicle.registered:
-        yield Fact("Seed", str(definition.seed))
+    has_ceiling = experiment.output == "altitude_m"
+    has_seed = campaign.vehicle.can_fly and not campaign.vehicle.registered
+    return (
+        Fact("Strategy", definition.strategy if strategy is None else strategy.title),
+        *_options(definition.options, () if strategy is None else strategy.options),
+        Fact("Start", _start(definition.start)),
+        *(Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}") for name, (low, high) in definition.bounds.items()),
+        Fact("Maximum step", f"{first} of each gain's range until a flight is valid, then {later}"),
+        *((Fact("Gate ceiling", f"{definition.ceiling_m:g} m"),) if has_ceiling else ()),
+        Fact("Stop rule", _stop(definition.stop, campaign.open_until_flight)),
+        *((Fact("Seed", str(definition.seed)),) if has_seed else ()),
+    )
 
 
 def _options(chosen: Mapping[str, OptionValue], known: Iterable[Option]) -> Iterator[Fact]:
-    described = {each.name: each for each in known}
+    titles = {each.name: (each.title, each.unit) for each in known}
     for name, value in chosen.items():
-        found = described.get(name)
         if value != "":
-            yield (
-                Fact(name, setting_text(value)) if found is None else Fact(found.title, setting_text(value, found.unit))
-            )
+            title, unit = titles.get(name, (name, ""))
+            yield Fact(title, setting_text(value, unit))
 
 
 def _start(start: Start) -> str:
@@ -264,21 +265,22 @@ MAX_PHOTO_BYTES: Final = 24 * 2**20
 
 def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
     """Remarks of the trials that have any, in order."""
-    photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
-    for row, size in photos_of_campaign(session, campaign_id):
-        photos.setdefault(row.trial_id, []).append((row, size))
-    kept, room = set[int](), MAX_PHOTO_BYTES
-    turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
-    for _, photo_id, size in turns:  # the first photo of each trial comes before the second of any
-        if size <= room:
-            kept.add(photo_id)
-            room -= size
+    sizes, room = dict(photos_of_campaign(session, campaign_id)), MAX_PHOTO_BYTES
+    by_trial = defaultdict[int, list[TrialPhotoRow]](list)
+    for row in sizes:
+        by_trial[row.trial_id].append(row)
+    kept = set[TrialPhotoRow]()
+    # The first photo of each trial comes before the second of any.
+    for row in sorted(sizes, key=lambda row: (by_trial[row.trial_id].index(row), row.id)):
+        if sizes[row] <= room:
+            session.refresh(row, ["data"])
+            kept.add(row)
+            room -= sizes[row]
     for trial in trials:
-        own = photos.get(trial.id, [])
-        if not trial.note and not own:
-            continue
-        shown = [Photo(row.media_type, row.data, row.added_at) for row, _ in own if row.id in kept]
-        yield Remark(trial=trial, photos=tuple(shown), left_out=len(own) - len(shown))
+        own = by_trial[trial.id]
+        shown = tuple(row for row in own if row in kept)
+        if trial.note or own:
+            yield Remark(trial=trial, photos=shown, left_out=len(own) - len(shown))
 
 
 def report_of(session: Session, campaign_id: int) -> Report:
@@ -301,8 +303,8 @@ def report_of(session: Session, campaign_id: int) -> Report:
         trials=trials,
         experiment=experiment.title,
         gains=experiment.space.gains,
-        what=tuple(describe_vehicle(campaign, experiment, vehicle.identity, safe_gains)),
-        how=tuple(describe_method(campaign, experiment)),
+        what=describe_vehicle(campaign, experiment, vehicle.identity, safe_gains),
+        how=describe_method(campaign, experiment),
         cards=(
             *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
             *((landscape,) if landscape.state == "ready" else ()),  # only if it has been computed already

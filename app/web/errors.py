@@ -91,11 +91,14 @@ def install(app: FastAPI) -> None:
         return document
 
     app.openapi = complete  # type: ignore[method-assign]
-    app.add_exception_handler(GainlineError, _own_error)
-    app.add_exception_handler(RequestValidationError, _invalid_request)
-    app.add_exception_handler(HTTPException, _http_error)
-    app.add_exception_handler(OSError, _system_error)
-    app.add_exception_handler(Exception, _unexpected)
+    for kind, handler in {
+        GainlineError: _own_error,
+        RequestValidationError: _invalid_request,
+        HTTPException: _http_error,
+        OSError: _system_error,
+        Exception: _unexpected,
+    }.items():
+        app.add_exception_handler(kind, handler)
 
 
 def _problem(
@@ -219,11 +222,13 @@ def reason_of(found: Mapping[str, Any], schema: object = None) -> str:
     if kind == "string_too_short" and limits["min_length"] == 1:
         return "must not be empty"
     if kind not in _REASONS:
-        text: str = found["msg"]
-        return text[:1].lower() + text[1:]
+        said: str = found["msg"]
+        return said[:1].lower() + said[1:]
     written = {name: f"{limit:g}" if isinstance(limit, float) else limit for name, limit in limits.items()}
     reason = _REASONS[kind].format_map(written)
-    return f"{reason}, got {_written(value)}" if kind in _QUOTED and _is_short(value) else reason
+    text = str(value).lower() if isinstance(value, bool) else repr(value)  # as JSON has it
+    is_short = isinstance(value, bool | int | float | str) and len(str(value)) <= _SHOWN
+    return f"{reason}, got {text}" if kind in _QUOTED and is_short else reason
 
 
 def _fields_at(schema: object, path: Sequence[object], kind: str) -> tuple[str, ...]:
@@ -244,15 +249,6 @@ def _model_in(schema: object) -> type[BaseModel] | None:
     if isinstance(schema, type) and issubclass(schema, BaseModel):
         return schema
     return next((model for part in get_args(schema) if (model := _model_in(part)) is not None), None)
-
-
-def _is_short(value: object) -> bool:
-    return isinstance(value, bool | int | float | str) and len(str(value)) <= _SHOWN
-
-
-def _written(value: object) -> str:
-    """A value as JSON has it."""
-    return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
 async def _http_error(request: Request, error: Exception) -> Response:

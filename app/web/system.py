@@ -11,7 +11,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, StreamingResponse
 
 from app import __version__
 from app.accounts.keys_and_links import LINK_VALID_S, Keyring
-from app.accounts.permissions import UNLOCK_HINT, Caller, Key, Permission, RequestOrigin, is_allowed
+from app.accounts.permissions import UNLOCK_HINT, Key, Permission, RequestOrigin, is_allowed
 from app.common.data_folder import folder_bytes
 from app.common.errors import InputError, Problem
 from app.common.schemas import Schema
@@ -139,20 +139,15 @@ class Access(Schema):
 def get_access(request: Request) -> Access:
     """What this client may do."""
     caller = caller_of(request)
-    may_change, may_command = is_allowed(Permission.CHANGE, caller), is_allowed(Permission.TAKE_OFF, caller)
+    elsewhere, may_command = caller.place is RequestOrigin.ELSEWHERE, is_allowed(Permission.TAKE_OFF, caller)
+    link_helps = caller.key < Key.REMOTE if elsewhere else not caller.exposed
     return Access(
-        elsewhere=caller.place is RequestOrigin.ELSEWHERE,
-        may_change=may_change,
+        elsewhere=elsewhere,
+        may_change=is_allowed(Permission.CHANGE, caller),
         may_link=is_allowed(Permission.LINK, caller),
         may_command=may_command,
-        hint="" if may_command or not _would_help(caller) else UNLOCK_HINT,
+        hint=UNLOCK_HINT if link_helps and not may_command else "",
     )
-
-
-def _would_help(caller: Caller) -> bool:
-    if caller.place is RequestOrigin.ELSEWHERE:
-        return caller.key < Key.REMOTE
-    return not caller.exposed
 
 
 @router.get("/unlock", include_in_schema=False)

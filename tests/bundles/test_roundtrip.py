@@ -370,3 +370,14 @@ def test_how_a_flight_ended_is_recognised_in_the_words_of_earlier_bundles(
     assert arrived("enough")["end"] == trial["end"]
     limit = arrived("A safety limit was exceeded. It rose to 4.6 m.")
     assert (limit["end"]["failure"], limit["end"]["request"], limit["given_reason"]) == ("F6", None, "")
+
+
+def test_a_valid_flight_of_an_earlier_bundle_has_an_end_as_one_of_an_earlier_database(
+    client: TestClient, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, _ = elsewhere
+    arrived = brought(there, as_of_version(5, download_bundle(client, campaign["id"]), without="end"))
+    trials = get(there, f"/api/campaigns/{arrived['id']}/trials")["items"]
+    assert [trial["state"] for trial in trials] == ["valid", "invalid", "valid"]
+    assert [(trial["end"]["failure"], trial["end"]["landed"]) for trial in trials] == [(None, "landed")] * 3
+    assert trials[1]["reason"] == "Gust, ≈ 4 m/s"

@@ -3,8 +3,10 @@
 A record is scored as it is stored, in single precision.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -48,6 +50,10 @@ from app.processes.calls import FILE, run_limited
 from app.vehicles.flight_end import FlightEnd, Requester
 
 CURVE_POINTS: Final = 48
+_CAUSES: Final[Mapping[Requester | None, AbortCause]] = MappingProxyType(
+    {None: "limit", Requester.PROGRAM_STOPPED: "something else"}
+)
+"""Causes of aborts that a person has not given: if Gainline was stopped, there is nothing to ask the operator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,25 +125,19 @@ def capture(
     row.curve = judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
     row.ending, row.end = ending, end
-    if ending == "aborted":
-        row.abort_cause = _abort_cause(end)
-    if ending == "aborted" and row.state == TrialState.FLYING:
-        set_trial_state(row, TrialState.ABORTED, reason="")
-        return
     set_trial_state(row, TrialState.CAPTURED, reason=reason)
     if ending == "aborted":
+        row.abort_cause = _CAUSES.get(end.requested_by if end else None, "operator")
         set_trial_state(row, TrialState.ABORTED)
         return
     row.error = judged.error  # shown before a person classifies the flight, which scores it again
-    if fleet.is_classed_automatically(row.campaign.vehicle):
-        _classify(row, reason if ending == "invalid" else judged.refusal)
-
-
-def _abort_cause(end: FlightEnd | None) -> AbortCause:
-    """Cause of an abort. If Gainline was stopped, there is nothing to ask the operator."""
-    if end is None or end.request is None:
-        return "limit"
-    return "something else" if end.requested_by is Requester.PROGRAM_STOPPED else "operator"
+    if not fleet.is_classed_automatically(row.campaign.vehicle):
+        return
+    if row.error is None or ending == "invalid":
+        row.error = None
+        set_trial_state(row, TrialState.INVALID, reason=reason if ending == "invalid" else judged.refusal)
+    elif not glitches:
+        set_trial_state(row, TrialState.VALID)
 
 
 def keep_response(row: TrialRow, response: StepResponse | None) -> None:
@@ -146,14 +146,6 @@ def keep_response(row: TrialRow, response: StepResponse | None) -> None:
         return
     row.rise_time_s, row.settling_time_s = response.rise_time_s, response.settling_time_s
     row.overshoot_m, row.steady_state_error_m = response.overshoot, response.steady_state_error
-
-
-def _classify(row: TrialRow, refusal: str) -> None:
-    if row.error is None or row.ending == "invalid":
-        row.error = None
-        set_trial_state(row, TrialState.INVALID, reason=refusal)
-    elif not row.glitches:
-        set_trial_state(row, TrialState.VALID)
 
 
 def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
@@ -285,15 +277,15 @@ def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:
     return name, "\n".join(lines) + "\n", row.trajectory.checksum
 
 
-def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
-    """Telemetry log of the trial's last flight that has one, else the one imported with the trial; and its name for
-    download.
-
-    Raises NotFoundError when there is none.
-    """
-    row = history.trial_row(session, trial_id)
+def telemetry_log_of(session: Session, trial_id: int, data_dir: Path) -> Path | None:
+    """Telemetry log of the trial's last flight that has one, else the one imported with the trial, if any."""
     flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
-    for file in (*flown, log_of_trial(data_dir, trial_id)):
-        if file.is_file():
-            return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"
-    raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")
+    return next((file for file in (*flown, log_of_trial(data_dir, trial_id)) if file.is_file()), None)
+
+
+def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
+    """Telemetry log of the trial, and its name for download. Raises NotFoundError when there is none."""
+    row = history.trial_row(session, trial_id)
+    if (file := telemetry_log_of(session, trial_id, data_dir)) is None:
+        raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")
+    return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AwareDatetime, Field, model_validator
 
 from app.campaigns.schemas import Variant
 from app.common.schemas import Gains, Gate, Number, OptionValue, Reason, Request, Schema, Text, Version
@@ -160,26 +160,16 @@ class TrialComparison(Schema):
     standard_error: float | None
 
 
-class Trial(Schema):
-    """One flight of one policy. `error` is the performance measure; lower is better."""
+class TrialFacts(Schema):
+    """What the database, the API and a bundle all tell of a trial."""
 
-    id: int
-    version: int
-    campaign_id: int
     number: int
     state: TrialState
     kind: TrialKind
     gains: Gains
     read_back: Gains | None
-    proposal_id: int | None
     error: float | None
     predicted_error: float | None
-    predicted_interval: Interval | None
-    inside_interval: Annotated[
-        bool | None, Field(description="whether a valid flight's error was inside the predicted interval")
-    ]
-    group: Annotated[GroupBrief | None, Field(description="all valid flights of the same gains; null before the first")]
-    comparisons: list[TrialComparison]
     overshoot_m: float | None
     rise_time_s: Annotated[float | None, Field(description="from 10 to 90 % of the set point; null if never reached")]
     settling_time_s: Annotated[
@@ -189,13 +179,7 @@ class Trial(Schema):
     steady_state_error_m: Annotated[
         float | None, Field(description="mean of output − set point over the last 5 s of the window")
     ]
-    verdict: Annotated[
-        str, Field(description="comparison of the flight with the best before it and with its prediction")
-    ]
     reason: Annotated[str, Field(description="reason for the state, for people; empty if there is none")]
-    given_reason: Annotated[
-        str, Field(description="the reason if a person or an import gave it; empty if it follows from `end`")
-    ]
     end: Annotated[FlightEnd | None, Field(description="how its last flight ended; null before the first")]
     abort_cause: Annotated[
         AbortCause | None,
@@ -206,24 +190,45 @@ class Trial(Schema):
         ),
     ]
     note: str
-    gate: Gate
     overrule_reason: Annotated[str, Field(description="why the gate's refusal was overruled; empty if it was not")]
-    glitches: Annotated[list[Glitch], Field(description="implausible parts of the record; the record is not changed")]
     repaired_error: Annotated[
         float | None, Field(description="error with the glitches replaced by straight lines; null without glitches")
     ]
+    seed: int
+    settings: Annotated[
+        dict[str, OptionValue], Field(description="settings that the vehicle reported after the flight")
+    ]
+    created_at: AwareDatetime
+    flown_at: AwareDatetime | None
+
+
+class Trial(TrialFacts):
+    """One flight of one policy. `error` is the performance measure; lower is better."""
+
+    id: int
+    version: int
+    campaign_id: int
+    proposal_id: int | None
+    predicted_interval: Interval | None
+    inside_interval: Annotated[
+        bool | None, Field(description="whether a valid flight's error was inside the predicted interval")
+    ]
+    group: Annotated[GroupBrief | None, Field(description="all valid flights of the same gains; null before the first")]
+    comparisons: list[TrialComparison]
+    verdict: Annotated[
+        str, Field(description="comparison of the flight with the best before it and with its prediction")
+    ]
+    given_reason: Annotated[
+        str, Field(description="the reason if a person or an import gave it; empty if it follows from `end`")
+    ]
+    gate: Gate
+    glitches: Annotated[list[Glitch], Field(description="implausible parts of the record; the record is not changed")]
     record: RecordBrief | None
     may_be_valid: Annotated[
         bool, Field(description="whether its record covers the scored window, so that it can be marked valid")
     ]
     flight: FlightBrief | None
-    seed: int
     speed: float | None
-    settings: Annotated[
-        dict[str, OptionValue], Field(description="settings that the vehicle reported after the flight")
-    ]
-    created_at: datetime
-    flown_at: datetime | None
     actions: Annotated[list[str], Field(description="allowed actions: fly, cancel, abort, upload, …")]
 
 

@@ -200,23 +200,16 @@ def create_trial(
         note=new.note,
         seed=flight_seed(definition_of(campaign).seed, number),
     )
+    found = None if proposal is not None or predict is None else predict(session, campaign, gains)
     if proposal is not None:
         row.proposal_id = proposal.id
         row.predicted_error, row.predicted_interval = proposal.predicted_error, proposal.interval
-    elif predict is not None:
-        _keep_prediction(row, predict(session, campaign, gains))
-    return trial_view(session, added(session, row))
-
-
-def _keep_prediction(row: TrialRow, found: Proposal | None) -> None:
-    """Store what is predicted for a trial with it."""
-    if found is None:
-        return
-    row.predicted_error = found.predicted_error
-    row.predicted_interval = None if found.interval is None else asdict(found.interval)
-    if found.predicted is not None:
+    elif found is not None:
+        row.predicted_error = found.predicted_error
+        row.predicted_interval = None if found.interval is None else asdict(found.interval)
         with suppress(TrajectoryError):  # a curve that single precision cannot hold is not drawn
-            row.predicted = pack(found.predicted)
+            row.predicted = None if found.predicted is None else pack(found.predicted)
+    return trial_view(session, added(session, row))
 
 
 def reopen_campaign(

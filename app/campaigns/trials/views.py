@@ -3,9 +3,9 @@ given the scatter of repeated flights.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
-from typing import Final, Literal
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -53,32 +53,31 @@ class ReferenceFlights:
         before = bisect_left(self.numbers, number)
         return self._best_so_far[before - 1] if before else None
 
+    def told_prediction(self, row: TrialRow) -> tuple[float | None, Interval | None]:
+        """The predicted error of a flight and its interval; both None if they said nothing."""
+        is_corrected = self.best_before(row.number) is not None
+        return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
+
 
 def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
     """Comparisons with the best flight before this one, then with the first; flights of the same gains are left out.
 
     Each side counts with all flights of its gains.
     """
-    own = field.by_number.get(row.number)
-    if own is None or field.scatter is None:
+    own, best = field.by_number.get(row.number), field.best_before(row.number)
+    if own is None or field.scatter is None or best is None:
         return []
-    found = []
-    for against, number in _others(row, field):
-        other = field.by_number.get(number)
-        if other is None or other.gains == own.gains:
-            continue
-        comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
-        found.append(TrialComparison.view_of(comparison, against=against, trial_number=number))
-    return found
-
-
-def _others(row: TrialRow, field: ReferenceFlights) -> Iterator[tuple[Literal["best before", "first"], int]]:
-    best = field.best_before(row.number)
-    if best is None:
-        return
-    yield "best before", best[1]
-    if (first := field.numbers[0]) != best[1]:
-        yield "first", first
+    others = {best[1]: "best before"}
+    others.setdefault(field.numbers[0], "first")
+    return [
+        TrialComparison.view_of(
+            compare(own, field.by_number[number], field.scatter, CONFIDENCE, plan_further=False),
+            against=against,
+            trial_number=number,
+        )
+        for number, against in others.items()
+        if field.by_number[number].gains != own.gains
+    ]
 
 
 def _key(gains: Gains) -> object:
@@ -118,41 +117,45 @@ def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> Traje
 
 
 def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
-    predicted_error, interval = _prediction(row, field)
+    predicted_error, interval = field.told_prediction(row)
     same = field.by_gains.get(_key(row.gains))
     again = [] if same is None else [number for number in same.numbers if number < row.number]
     return Trial.view_of(
         row,
         predicted_error=predicted_error,
         predicted_interval=interval,
-        inside_interval=_is_inside(interval, row),
+        inside_interval=None
+        if interval is None or row.error is None
+        else interval.lower <= row.error <= interval.upper,
         group=None
         if same is None or field.scatter is None
         else GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size),
         comparisons=comparisons(row, field),
         verdict=verdict(row, field, get_experiment(row.campaign.experiment).error_unit, again),
         glitches=row.glitches or [],
-        record=_record(row),
+        record=None
+        if row.trajectory is None
+        else RecordBrief.view_of(
+            row.trajectory,
+            ending=row.ending or "completed",
+            channels=row.trajectory.columns[1:],
+            units=_units(row.trajectory.columns[1:]),
+        ),
         may_be_valid=_may_be_valid(row),
-        flight=_flight(flight),
+        flight=None
+        if flight is None
+        else FlightBrief.view_of(
+            flight,
+            problem=end_text(flight.end),
+            standing_down=unstaged_text(Requester(flight.stand_down)) if flight.stand_down else "",
+            safe_gains_restored=None if flight.restored is None else flight.restored == flight.safe_gains,
+        ),
         speed=flight.speed if flight else None,
         settings=row.settings or {},
         reason=reason_of(row),
         given_reason=row.reason,
         actions=_actions(row, flight, rehearsed),
     )
-
-
-def _prediction(row: TrialRow, field: ReferenceFlights) -> tuple[float | None, Interval | None]:
-    """The predicted error and its interval; both None if they said nothing."""
-    is_corrected = field.best_before(row.number) is not None
-    return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
-
-
-def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
-    if interval is None or row.error is None:
-        return None
-    return interval.lower <= row.error <= interval.upper
 
 
 def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
@@ -164,7 +167,7 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
             outcome = f", repeating the gains of {named_flights(again)}" if again else f": {compared}"
-            predicted_error, _ = _prediction(row, field)
+            predicted_error, _ = field.told_prediction(row)
             forecast = "" if predicted_error is None else f"; {short(predicted_error)} {unit} was predicted"
             return f"{short(row.error)} {unit}{outcome}{forecast}."
         case TrialState.ABORTED:
@@ -207,14 +210,6 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
     return f"{short(abs(gain))} {unit}{share} {relation} {than}"
 
 
-def _record(trial: TrialRow) -> RecordBrief | None:
-    row = trial.trajectory
-    if row is None:
-        return None
-    channels = row.columns[1:]
-    return RecordBrief.view_of(row, ending=trial.ending or "completed", channels=channels, units=_units(channels))
-
-
 def _may_be_valid(row: TrialRow) -> bool:
     """Whether a person may mark the flight valid. Without its record, which is large: its last time is in the curve."""
     if row.state not in {TrialState.CAPTURED, TrialState.INVALID} or row.ending == "aborted" or not row.curve:
@@ -226,38 +221,21 @@ def _units(channels: Iterable[str]) -> dict[str, str]:
     return {name: CHANNEL_UNITS.get(name, "") for name in channels}
 
 
-def _flight(row: FlightRow | None) -> FlightBrief | None:
-    if row is None:
-        return None
-    return FlightBrief.view_of(
-        row,
-        problem=end_text(row.end),
-        standing_down=unstaged_text(Requester(row.stand_down)) if row.stand_down else "",
-        safe_gains_restored=None if row.restored is None else row.restored == row.safe_gains,
-    )
-
-
 def _actions(row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
     """Allowed actions: those of the state table, less what the vehicle cannot do, what an active flight rules out, and
     what a missing rehearsal of a real vehicle rules out."""
     vehicle = row.campaign.vehicle
     under_way = flight is not None and flight.state in ACTIVE_FLIGHT_STATES
-    impossible = set()
-    if under_way or not fleet.can_fly(vehicle):
-        impossible |= {"fly", "stage"}
-    if fleet.needs_staging(vehicle):
-        impossible.add("fly")
-    if not vehicle.registered or not rehearsed:
-        impossible.add("stage")
-    if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING or flight.stand_down:
-        impossible |= {"take-off", "unstage"}
-    elif flight.take_off_at is not None:
-        impossible.add("take-off")
-    if fleet.can_fly(vehicle) and row.state == TrialState.PLANNED:
-        impossible.add("upload")
-    if row.campaign.state not in CAMPAIGN_ACTIONS["judge"]:
-        impossible |= {"classify", "upload", "judge abort"}
-    if row.abort_cause == "limit":
-        impossible.add("judge abort")
-    possible = [action for action in allowed(TRIAL_ACTIONS, row.state) if action not in impossible]
+    waits = flight is not None and flight.mode == "stage" and flight.state == FlightState.RUNNING
+    ruled_out = (
+        (under_way or not fleet.can_fly(vehicle), {"fly", "stage"}),
+        (fleet.needs_staging(vehicle), {"fly"}),
+        (not vehicle.registered or not rehearsed, {"stage"}),
+        (flight is None or not waits or flight.stand_down, {"take-off", "unstage"}),
+        (flight is not None and flight.take_off_at is not None, {"take-off"}),
+        (fleet.can_fly(vehicle) and row.state == TrialState.PLANNED, {"upload"}),
+        (row.campaign.state not in CAMPAIGN_ACTIONS["judge"], {"classify", "upload", "judge abort"}),
+        (row.abort_cause == "limit", {"judge abort"}),
+    )
+    possible = allowed(TRIAL_ACTIONS, row.state, ruled_out)
     return [*possible, "abort"] if under_way and "abort" not in possible else possible

@@ -3937,18 +3937,6 @@ export type Trend = {
  */
 export type Trial = {
     /**
-     * Id
-     */
-    id: number;
-    /**
-     * Version
-     */
-    version: number;
-    /**
-     * Campaign Id
-     */
-    campaign_id: number;
-    /**
      * Number
      */
     number: number;
@@ -3970,10 +3958,6 @@ export type Trial = {
         [key: string]: number | number;
     } | null;
     /**
-     * Proposal Id
-     */
-    proposal_id: number | null;
-    /**
      * Error
      */
     error: number | null;
@@ -3981,21 +3965,6 @@ export type Trial = {
      * Predicted Error
      */
     predicted_error: number | null;
-    predicted_interval: Interval | null;
-    /**
-     * Inside Interval
-     *
-     * whether a valid flight's error was inside the predicted interval
-     */
-    inside_interval: boolean | null;
-    /**
-     * all valid flights of the same gains; null before the first
-     */
-    group: GroupBrief | null;
-    /**
-     * Comparisons
-     */
-    comparisons: Array<TrialComparison>;
     /**
      * Overshoot M
      */
@@ -4019,23 +3988,11 @@ export type Trial = {
      */
     steady_state_error_m: number | null;
     /**
-     * Verdict
-     *
-     * comparison of the flight with the best before it and with its prediction
-     */
-    verdict: string;
-    /**
      * Reason
      *
      * reason for the state, for people; empty if there is none
      */
     reason: string;
-    /**
-     * Given Reason
-     *
-     * the reason if a person or an import gave it; empty if it follows from `end`
-     */
-    given_reason: string;
     /**
      * how its last flight ended; null before the first
      */
@@ -4050,7 +4007,6 @@ export type Trial = {
      * Note
      */
     note: string;
-    gate: Gate;
     /**
      * Overrule Reason
      *
@@ -4058,33 +4014,15 @@ export type Trial = {
      */
     overrule_reason: string;
     /**
-     * Glitches
-     *
-     * implausible parts of the record; the record is not changed
-     */
-    glitches: Array<Glitch>;
-    /**
      * Repaired Error
      *
      * error with the glitches replaced by straight lines; null without glitches
      */
     repaired_error: number | null;
-    record: RecordBrief | null;
-    /**
-     * May Be Valid
-     *
-     * whether its record covers the scored window, so that it can be marked valid
-     */
-    may_be_valid: boolean;
-    flight: FlightBrief | null;
     /**
      * Seed
      */
     seed: number;
-    /**
-     * Speed
-     */
-    speed: number | null;
     /**
      * Settings
      *
@@ -4101,6 +4039,68 @@ export type Trial = {
      * Flown At
      */
     flown_at: string | null;
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * Version
+     */
+    version: number;
+    /**
+     * Campaign Id
+     */
+    campaign_id: number;
+    /**
+     * Proposal Id
+     */
+    proposal_id: number | null;
+    predicted_interval: Interval | null;
+    /**
+     * Inside Interval
+     *
+     * whether a valid flight's error was inside the predicted interval
+     */
+    inside_interval: boolean | null;
+    /**
+     * all valid flights of the same gains; null before the first
+     */
+    group: GroupBrief | null;
+    /**
+     * Comparisons
+     */
+    comparisons: Array<TrialComparison>;
+    /**
+     * Verdict
+     *
+     * comparison of the flight with the best before it and with its prediction
+     */
+    verdict: string;
+    /**
+     * Given Reason
+     *
+     * the reason if a person or an import gave it; empty if it follows from `end`
+     */
+    given_reason: string;
+    gate: Gate;
+    /**
+     * Glitches
+     *
+     * implausible parts of the record; the record is not changed
+     */
+    glitches: Array<Glitch>;
+    record: RecordBrief | null;
+    /**
+     * May Be Valid
+     *
+     * whether its record covers the scored window, so that it can be marked valid
+     */
+    may_be_valid: boolean;
+    flight: FlightBrief | null;
+    /**
+     * Speed
+     */
+    speed: number | null;
     /**
      * Actions
      *
