@@ -1,6 +1,6 @@
 """Registries of the autopilots and of the experiments: those of the autopilots, and one without any."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from itertools import chain, zip_longest
 from types import MappingProxyType
@@ -34,6 +34,23 @@ EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType(
     }
 )
 """Those of the default autopilot first, then the others' by rank."""
+
+REPLACEMENTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        without_model.name: modelled.name
+        for experiments in _OTHERS
+        for without_model in experiments
+        for modelled in experiments
+        if without_model.modelled is None and modelled.modelled is not None
+    }
+)
+"""Experiments that are not offered for new campaigns, and what replaces each: without a model nothing proposes gains.
+Stored campaigns still fly them."""
+
+
+def offered(experiments: Iterable[str]) -> list[str]:
+    """Those of these experiments that a new campaign can have."""
+    return [name for name in experiments if name not in REPLACEMENTS]
 
 
 def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) -> Experiment:

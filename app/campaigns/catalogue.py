@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from app import __version__
-from app.autopilots.registry import AUTOPILOTS, EXPERIMENTS
+from app.autopilots.registry import AUTOPILOTS, EXPERIMENTS, offered
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema
@@ -157,7 +157,7 @@ def get_catalogue() -> Catalogue:
             VehicleKindInfo.view_of(
                 kind,
                 registered=is_registered_one_by_one(kind),
-                experiments=list(kind.experiments),
+                experiments=offered(kind.experiments),
                 highest_set_point_m=kind.highest_set_point_m if math.isfinite(kind.highest_set_point_m) else None,
             )
             for kind in VEHICLE_KINDS.values()

@@ -11,7 +11,7 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import EXPERIMENTS, evidence_of, experiment_of, get_experiment
+from app.autopilots.registry import EXPERIMENTS, REPLACEMENTS, evidence_of, experiment_of, get_experiment, offered
 from app.campaigns import history, repository
 from app.campaigns.schemas import Definition as DefinitionIn
 from app.campaigns.schemas import Donor, Start
@@ -80,11 +80,14 @@ def stored(definition: Definition) -> JsonObject:
     return {name: value for name, value in asdict(definition).items() if name != "safe_gains"}
 
 
-def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definition, dict[str, OptionValue]]:
+def check_campaign(
+    asked: DefinitionIn, vehicle: VehicleChoice, *, continues: str = ""
+) -> tuple[Definition, dict[str, OptionValue]]:
     """Check a campaign; return its definition and the complete vehicle options.
 
     A registered vehicle has options of its own, so none are returned; its gains are compared with the experiment's in
-    `fleet`. Raises InputError that names everything invalid in either.
+    `fleet`. `continues` is the experiment of the stored campaign that this one changes or rehearses, which may be one
+    that is no longer offered. Raises InputError that names everything invalid in either.
     """
     donor = asked.start.donor
     if donor is not None and donor.trial_number is None:
@@ -94,7 +97,10 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
             hint="Remove the donor, or set start.kind to 'campaign'.",
         )
     definition = core_definition(asked)
-    problems = [Problem(f"definition.{each.field}", each.reason) for each in problems_of(definition, EXPERIMENTS)]
+    problems = [
+        *_replaced(definition.experiment, continues),
+        *(Problem(f"definition.{each.field}", each.reason) for each in problems_of(definition, EXPERIMENTS)),
+    ]
     options: dict[str, OptionValue] = {}
     try:
         options |= check_options(vehicle.kind, vehicle.options, field="vehicle") if vehicle.id is None else {}
@@ -110,6 +116,12 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
     return definition, options
 
 
+def _replaced(experiment: str, continues: str) -> Iterator[Problem]:
+    if experiment in REPLACEMENTS and experiment != continues:
+        reason = f"{experiment!r} is no longer offered for new campaigns; use {REPLACEMENTS[experiment]!r} instead"
+        yield Problem("definition.experiment", reason)
+
+
 def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionValue]) -> Iterator[Problem]:
     """Problems with the combination of experiment and vehicle. `options` is empty if invalid, and for a registered
     vehicle."""
@@ -118,9 +130,12 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
     described = VEHICLE_KINDS[kind]
     if definition.experiment not in described.experiments:
         yield Problem("definition.experiment", f"{definition.experiment!r} cannot be flown by {kind}")
-        yield Problem("vehicle.kind", f"{kind!r} flies only {', '.join(described.experiments)}")
+        yield Problem("vehicle.kind", f"{kind!r} flies only {', '.join(offered(described.experiments))}")
     elif options and definition.experiment not in (flies := described.experiments_with(options)):
-        reason = f"{definition.experiment!r} tunes gains that this vehicle does not have; it flies {', '.join(flies)}"
+        reason = (
+            f"{definition.experiment!r} tunes gains that this vehicle does not have; "
+            f"it flies {', '.join(offered(flies))}"
+        )
         yield Problem("definition.experiment", reason)
     elif (
         excess_m := highest_set_point_m(definition, EXPERIMENTS.get(definition.experiment))

@@ -123,13 +123,14 @@ def add_campaign(
     *,
     parent_id: int | None = None,
     safe_gains: dict[str, float] | None = None,
+    continues: str = "",
 ) -> CampaignRow:
-    """Add a draft and request its first proposal.
+    """Add a draft and request its first proposal. `continues` is as in `check_campaign`.
 
     `safe_gains` are given for a rehearsal: those of the vehicle that it is for. Every other campaign gets its own
     vehicle's at its first flight. Raises InputError that names what cannot be used.
     """
-    definition, options, vehicle = _checked(session, asked, choice)
+    definition, options, vehicle = _checked(session, asked, choice, continues)
     row = CampaignRow(
         name=name,
         state=CampaignState.DRAFT,
@@ -287,10 +288,10 @@ def _choice_of(row: CampaignRow) -> VehicleChoice:
 
 
 def _checked(
-    session: Session, asked: Definition, choice: VehicleChoice
+    session: Session, asked: Definition, choice: VehicleChoice, continues: str
 ) -> tuple[CoreDefinition, dict[str, OptionValue], VehicleRow]:
     """The checked definition, the campaign's own vehicle options (none for a registered vehicle), and the vehicle."""
-    definition, options = check_campaign(fill_in_donor(session, asked), choice)
+    definition, options = check_campaign(fill_in_donor(session, asked), choice, continues=continues)
     space = get_experiment(definition.experiment).space
     vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
     return definition, options, vehicle
@@ -300,7 +301,8 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     check_action(CAMPAIGN_ACTIONS, "define", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     vehicle = edit.vehicle or _choice_of(row)
-    definition, options, row.vehicle = _checked(session, edit.definition or _definition_for(row, vehicle), vehicle)
+    asked = edit.definition or _definition_for(row, vehicle)
+    definition, options, row.vehicle = _checked(session, asked, vehicle, row.experiment)
     row.experiment, row.strategy = definition.experiment, definition.strategy
     row.definition, row.vehicle_options = stored(definition), options
     if row.vehicle.is_real:  # it gets the safe gains of its own vehicle; a rehearsal had those of another
@@ -373,6 +375,7 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
         simulation,
         parent_id=row.id,
         safe_gains=dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains),
+        continues=row.experiment,
     )
     added(session, RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
     notify_rehearsed_campaign(session, made)

@@ -1,11 +1,14 @@
 """`gainline run`: a whole campaign without the dashboard, by the same services on a temporary database."""
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Event
 
+import structlog
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
@@ -24,7 +27,6 @@ from app.cli.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
 from app.common.states import HISTORY_TRIAL_STATES, CampaignState, TrialState, VehicleState
-from app.core.clock import REAL_TIME
 from app.core.definition import Definition
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
@@ -37,12 +39,14 @@ from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.registration import register_vehicle
 from app.fleet.schemas import NewVehicle, VehicleChoice
-from app.flights import flight_rows
-from app.flights.process_messages import FlightRequest
+from app.flights.direct_flight import DirectFlight
+from app.flights.runner import FlightRunner
 from app.flights.service import fly_new_trial
-from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError, find_mismatch
+from app.flights.worker_part import AbortRegistry, WorkerPart
+from app.live.messages import FlightPhase, PublishedMessage, Telemetry
+from app.vehicles.base import OptionValue, VehicleError
 from app.vehicles.flight_end import end_text
-from app.vehicles.registry import get_kind, open_vehicle
+from app.vehicles.registry import get_kind
 
 
 def run_campaign(file: CampaignFile, *, json_out: Path | None, data_dir: Path, overrule: str = "") -> None:
@@ -69,7 +73,7 @@ def run_campaign(file: CampaignFile, *, json_out: Path | None, data_dir: Path, o
         write_json(json_out, _document(file, definition, options, display, stopped_because))
 
     try:
-        with display, _temporary_database() as database:
+        with display, _logs_to_stderr(), _temporary_database() as database:
             stopped_because = _Campaign(database, file, experiment, display, folder).fly(
                 given, overrule, max_flights=definition.stop.max_flights
             )
@@ -98,6 +102,20 @@ def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue])
 
 
 @contextmanager
+def _logs_to_stderr() -> Iterator[None]:
+    """Print what the flight runner logs as an error; standard output may carry the JSON."""
+    before = structlog.get_config()
+    structlog.configure(
+        wrapper_class=structlog.make_filtering_bound_logger("error"),
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+    )
+    try:
+        yield
+    finally:
+        structlog.configure(**before)
+
+
+@contextmanager
 def _temporary_database() -> Iterator[Database]:
     with TemporaryDirectory(prefix="gainline-") as folder:
         file = Path(folder) / "gainline.sqlite3"
@@ -122,7 +140,19 @@ class _Campaign:
     ) -> None:
         self._database = database
         self._display = display
-        self._trial_parameters = trial_parameters
+        self._flight = DirectFlight(display.hear, display.hold, trial_parameters)
+        self._runner = FlightRunner(
+            WorkerPart(
+                database=database,
+                data_dir=database.file.parent,
+                abort_registry=AbortRegistry(),
+                publish=display.hear,
+                worker="gainline run",
+                closing=Event(),
+            ),
+            session=lambda _vehicle_id: self._flight,
+            pool=None,
+        )
         kind = get_kind(file.vehicle.kind)
         with database.write() as session:
             if kind.connect is None:
@@ -175,52 +205,22 @@ class _Campaign:
         with self._database.write() as session:
             planned = create_trial(session, self._id, new)
             fly_new_trial(session, planned.id, FlightOrder(speed=None))
-            request = flight_rows.claim_flight(session, "gainline run")
-            assert request is not None
+        request = self._runner.claim()
+        assert request is not None
         self._display.planned(planned.number, request.gains)
-        outcome = flight_rows.outcome_of(self._fly(request))
-        if outcome.record is None:
-            raise VehicleError(
-                f"Flight {planned.number}: {end_text(outcome.end)}", hint="Correct this, then run it again."
-            )
+        self._runner.carry_out(request)
+        if self._flight.error is not None:
+            raise self._flight.error
         with self._database.write() as session:
-            flight_rows.record_outcome(session, request.flight_id, outcome)
             trial = history.trial_row(session, request.trial_id)
+            if trial.trajectory is None:
+                end = history.latest_flights(session, [trial.id])[trial.id].end
+                raise VehicleError(f"Flight {trial.number}: {end_text(end)}", hint="Correct this, then run it again.")
             if trial.state == TrialState.CAPTURED:
                 reason = " ".join(glitch["sentence"] for glitch in trial.glitches or ())
                 invalid = Classification.model_construct(version=trial.version, outcome="invalid", reason=reason)
                 classify_trial(session, trial.id, invalid)
         return trial
-
-    def _fly(self, request: FlightRequest) -> FlightRecord:
-        opened = False
-        try:
-            with open_vehicle(
-                request.vehicle_kind,
-                request.vehicle_options,
-                safe_gains=request.safe_gains,
-                trial_parameters=self._trial_parameters,
-            ) as vehicle:
-                opened = True
-                self._display.hold(None)
-                held = vehicle.stage(request.gains)
-                if mismatch := find_mismatch(held, request.gains):
-                    raise VehicleError(
-                        f"The vehicle did not accept the gains: {mismatch}. It was not flown.",
-                        hint="Read its gains back manually before it flies again.",
-                    )
-                with self._database.write() as session:
-                    flight_rows.record_staged(session, request.flight_id, held)
-                    flight_rows.record_lift_off(session, request.flight_id)
-                return vehicle.fly(
-                    request.options(REAL_TIME), on_sample=self._display.sampled, should_stop=lambda: None
-                )
-        except SafeGainsError:
-            opened = False
-            raise
-        finally:
-            if opened:
-                self._display.hold(request.safe_gains)
 
 
 class _Display:
@@ -242,7 +242,7 @@ class _Display:
         self._task = self._progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
-        self._output, self._output_unit = experiment.output, CHANNEL_UNITS[experiment.output]
+        self._output_unit = CHANNEL_UNITS[experiment.output]
         self.trials: list[TrialRow] = []
         self.kinds: list[str] = []
         self.touched = False
@@ -266,10 +266,12 @@ class _Display:
             description=f"flight {number} of at most {self._limit}, {format_gains(gains)}",
         )
 
-    def sampled(self, sample: Sample) -> None:
-        self._progress.update(
-            self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}"
-        )
+    def hear(self, message: PublishedMessage) -> None:
+        match message:
+            case Telemetry(samples=[*_, [time_s, output, *_]]):
+                self._progress.update(self._task, completed=time_s, note=f"{output:.2f} {self._output_unit}")
+            case FlightPhase(note=note) if note:
+                self._progress.update(self._task, note=note)
 
     def landed(self, trial: TrialRow, kind: str) -> None:
         self.trials.append(trial)

@@ -11,6 +11,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.autopilots.registry import offered
 from app.common.conflict_checks import allowed, check_action, check_transition
 from app.common.errors import BusyError, ConflictError, InputError, Problem
 from app.common.schemas import OptionValue, Page
@@ -263,7 +264,7 @@ def vehicle_view(row: VehicleRow) -> Vehicle:
     return Vehicle.view_of(
         row,
         can_fly=can_fly(row),
-        experiments=experiments_of(row),
+        experiments=offered(experiments_of(row)),
         options=settings_of(row) if row.registered else row.options,
         control=control_of(row),
         actions=_actions(row),

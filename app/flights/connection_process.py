@@ -6,7 +6,7 @@ are dropped when the worker does not read them, so that a flight never waits for
 
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -26,6 +26,7 @@ from app.flights.process_messages import (
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
+    FlightMessage,
     FlightRequest,
     SafeGainsRestored,
     Staging,
@@ -42,7 +43,6 @@ from app.live.messages import SILENT_AFTER_S, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
     ConnectedVehicle,
-    FlightRecord,
     InterruptedByOrderError,
     SafeGainsError,
     Vehicle,
@@ -325,11 +325,11 @@ class VehicleProcess(FlightLoop):
                 "Check that this computer is not overloaded, then request the flight again.",
             )
 
-    def _take_off(self, vehicle: Vehicle, request: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
+    def _take_off(self, vehicle: Vehicle, request: FlightRequest, cleared: TakeOffCommand) -> Generator[FlightMessage]:
         with self._interruptible():
             self._take_off_by_s = cleared.by_s
             self._require_in_time()
-            return super()._take_off(vehicle, request, cleared)
+            yield from super()._take_off(vehicle, request, cleared)
 
     def _should_stop(self) -> StopRequest | None:
         self._require_in_time()

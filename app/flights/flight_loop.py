@@ -9,7 +9,7 @@ import os
 import select
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -26,6 +26,7 @@ from app.flights.process_messages import (
     FlightFailure,
     FlightFinished,
     FlightLanded,
+    FlightMessage,
     FlightRequest,
     FromVehicleProcess,
     GainsStaged,
@@ -36,13 +37,7 @@ from app.flights.process_messages import (
 from app.live.messages import FlightPhase, Telemetry
 from app.processes import ignore_stop_signals
 from app.processes.locks import LockedError, exclusive
-from app.vehicles.base import (
-    FlightRecord,
-    SafeGainsError,
-    Sample,
-    Vehicle,
-    VehicleError,
-)
+from app.vehicles.base import SafeGainsError, Sample, Vehicle, VehicleError
 from app.vehicles.flight_end import Requester, StopRequest
 from app.vehicles.jsbsim import prepare
 from app.vehicles.registry import open_vehicle
@@ -105,16 +100,80 @@ class WorkerPipe:
                 self._pipe.send(message)
 
 
-class FlightLoop(ABC):
-    """Carries out flights, one after another, for the worker at the other end of the pipe."""
+class FlightExecution(ABC):
+    """Carries out one flight after another, from staging the gains to the record, for a FlightRunner."""
 
-    def __init__(self, line: WorkerPipe, clock: Clock, show: Callable[[Telemetry], None]) -> None:
+    def __init__(self, clock: Clock, show: Callable[[Telemetry], None]) -> None:
         """`show` sends telemetry."""
-        self._line = line
         self._clock = clock
         self._show = show
         self._trial_id: int | None = None
         self._stop: StopRequest | None = None
+
+    @abstractmethod
+    def _next(self) -> ToVehicleProcess:
+        """Wait for the runner's next message. Raises PipeClosedError."""
+
+    @abstractmethod
+    def _vehicle_for(self, request: FlightRequest) -> AbstractContextManager[Vehicle]:
+        """The vehicle for one flight; however the flight ends, it is left with its safe gains, read back."""
+
+    def fly(self, request: FlightRequest) -> Generator[FlightMessage]:
+        """Carry out the flight, yielding what the runner is to know. After GainsStaged the runner answers.
+
+        Raises PipeClosedError; any other error is a FlightFailure.
+        """
+        self._trial_id, self._stop = request.trial_id, None
+        try:
+            with self._vehicle_for(request) as vehicle:
+                with self._interruptible():
+                    read_back = vehicle.stage(request.gains)
+                yield GainsStaged(read_back)
+                if (cleared := self._await_takeoff_clearance()) is not None:
+                    yield from self._take_off(vehicle, request, cleared)
+        except PipeClosedError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
+            yield failure_from(error)
+        finally:
+            self._trial_id = None
+        yield FlightFinished()
+
+    def _interruptible(self) -> AbstractContextManager[None]:
+        """Context that a command for the vehicle interrupts; a simulation gets none."""
+        return nullcontext()
+
+    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
+        """Wait for the runner's decision. Raises PipeClosedError."""
+        while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
+            self._note(answer)
+        return answer if isinstance(answer, TakeOffCommand) else None
+
+    def _take_off(self, vehicle: Vehicle, request: FlightRequest, _cleared: TakeOffCommand) -> Generator[FlightMessage]:
+        monitor = FlightMonitor(request, self._show, self._clock)
+        yield FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="flying")
+        record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=self._should_stop)
+        monitor.flush()
+        if record.has_flown:
+            yield FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="landed")
+        yield FlightLanded(record)
+
+    def _should_stop(self) -> StopRequest | None:
+        """Stop callback, called every few milliseconds in the air."""
+        return self._stop
+
+    def _note(self, message: ToVehicleProcess) -> None:
+        """Note a reason to end the flight: the first one counts."""
+        if isinstance(message, CancelFlight) and message.trial_id == self._trial_id:
+            self._stop = self._stop or message.request
+
+
+class FlightLoop(FlightExecution):
+    """Carries out flights for the worker at the other end of the pipe."""
+
+    def __init__(self, line: WorkerPipe, clock: Clock, show: Callable[[Telemetry], None]) -> None:
+        super().__init__(clock, show)
+        self._line = line
         self._is_worker_gone = False
 
     def run(self) -> None:
@@ -122,56 +181,13 @@ class FlightLoop(ABC):
         while True:
             self._carry_out(self._next())
 
-    @abstractmethod
-    def _next(self) -> ToVehicleProcess:
-        """Wait for the worker's next message. Raises PipeClosedError."""
-
-    @abstractmethod
-    def _vehicle_for(self, request: FlightRequest) -> AbstractContextManager[Vehicle]:
-        """The vehicle for one flight; however the flight ends, it is left with its safe gains, read back."""
-
     def _carry_out(self, asked: ToVehicleProcess) -> None:
         if isinstance(asked, FlightRequest):  # anything else belongs to a flight that is over
-            self._fly(asked)
-
-    def _fly(self, request: FlightRequest) -> None:
-        self._trial_id, self._stop = request.trial_id, None
-        try:
-            with self._vehicle_for(request) as vehicle:
-                with self._interruptible():
-                    read_back = vehicle.stage(request.gains)
-                self._line.send(GainsStaged(read_back))
-                if (cleared := self._await_takeoff_clearance()) is not None:
-                    self._line.send(FlightLanded(self._take_off(vehicle, request, cleared)))
-        except PipeClosedError:
-            raise
-        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
-            self._line.send(failure_from(error))
-        finally:
-            self._trial_id = None
-        self._line.send(FlightFinished())
-
-    def _interruptible(self) -> AbstractContextManager[None]:
-        """Context that a command for the vehicle interrupts; a simulation gets none."""
-        return nullcontext()
-
-    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
-        """Wait for the worker's decision. Raises PipeClosedError."""
-        while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
-            self._note(answer)
-        return answer if isinstance(answer, TakeOffCommand) else None
-
-    def _take_off(self, vehicle: Vehicle, request: FlightRequest, _cleared: TakeOffCommand) -> FlightRecord:
-        monitor = FlightMonitor(request, self._show, self._clock)
-        self._line.send(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="flying"))
-        record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=self._should_stop)
-        monitor.flush()
-        if record.has_flown:
-            self._line.send(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="landed"))
-        return record
+            for message in self.fly(asked):
+                self._line.send(message)
 
     def _should_stop(self) -> StopRequest | None:
-        """Stop callback, called every few milliseconds in the air; polling the pipe takes microseconds."""
+        """Poll the pipe, which takes microseconds."""
         try:
             while not self._is_worker_gone and (message := self._line.receive()) is not None:
                 self._note(message)
@@ -179,11 +195,6 @@ class FlightLoop(ABC):
             self._is_worker_gone = True
             self._stop = self._stop or StopRequest(by=Requester.WORKER_EXITED)
         return self._stop
-
-    def _note(self, message: ToVehicleProcess) -> None:
-        """Note a reason to end the flight: the first one counts."""
-        if isinstance(message, CancelFlight) and message.trial_id == self._trial_id:
-            self._stop = self._stop or message.request
 
 
 class SimulationLoop(FlightLoop):

@@ -15,7 +15,7 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
@@ -38,7 +38,6 @@ from app.flights.process_messages import (
     FlightMessage,
     FlightRequest,
     FromVehicleProcess,
-    Publish,
     StagingLost,
     TakeOffCommand,
     ToVehicleProcess,
@@ -47,7 +46,7 @@ from app.flights.process_messages import (
     VehicleResponse,
     status_time,
 )
-from app.live.messages import NO_LINK, SILENT_AFTER_S, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
+from app.live.messages import NO_LINK, SILENT_AFTER_S, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
 from app.vehicles.base import SafeGainsError, VehicleError
 from app.vehicles.flight_end import StopRequest
@@ -83,8 +82,8 @@ class FlightProcess:
     def alive(self) -> bool:
         return self._child.alive
 
-    def fly(self, request: FlightRequest, publish: Publish) -> Iterator[FlightMessage]:
-        """Send the request, publish telemetry and phases, and yield the other messages until the process is free again.
+    def fly(self, request: FlightRequest) -> Generator[FlightMessage]:
+        """Send the request, and yield the messages until the process is free again.
 
         The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
         """
@@ -93,10 +92,7 @@ class FlightProcess:
             self._post(request)
             while not isinstance(message := self._next(), FlightFinished):
                 assert isinstance(message, FlightMessage), message
-                if isinstance(message, Telemetry | FlightPhase):
-                    publish(message)
-                else:
-                    yield message
+                yield message
         finally:
             self.trial_id = None
 

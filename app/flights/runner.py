@@ -5,7 +5,7 @@ landing; a record goes to the spool first, and from there into the database.
 """
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from typing import Final
 
@@ -16,7 +16,8 @@ from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
 from app.db.session import RETRY_S
 from app.flights import flight_rows
-from app.flights.flight_process import FlightProcess, FlightProcessPool, VehicleConnection
+from app.flights.direct_flight import DirectFlight
+from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
     FlightFailure,
@@ -27,7 +28,7 @@ from app.flights.process_messages import (
 )
 from app.flights.record_spool import Spool
 from app.flights.worker_part import AbortFlag, WorkerPart
-from app.live.messages import FlightPhase, Phase
+from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import find_mismatch
 from app.vehicles.flight_end import end_text
 from app.vehicles.registry import get_kind
@@ -36,25 +37,30 @@ STAGED_FOR_S: Final = 600.0
 """How long a vehicle with a trial's gains on it waits for its operator's takeoff request."""
 POLL_INTERVAL_S: Final = 0.05
 
+FlightBackend = FlightProcess | DirectFlight
+
 _log = structlog.get_logger(__name__)
 
 
 class FlightRunner:
     """Claims flights and carries them out.
 
-    `session(vehicle_id)` returns the process of a vehicle that keeps its connection between flights; other vehicles are
-    opened for each flight in a process of the pool.
+    `session(vehicle_id)` returns what flies a vehicle that keeps its connection between flights; other vehicles are
+    opened for each flight in a process of the pool. Without a pool `session` flies every vehicle.
     """
 
-    def __init__(self, part: WorkerPart, *, session: Callable[[int], FlightProcess]) -> None:
+    def __init__(
+        self, part: WorkerPart, *, session: Callable[[int], FlightBackend], pool: FlightProcessPool | None
+    ) -> None:
         self._part = part
         self._session = session
         self._spool = Spool(part.data_dir / "spool")
-        self._process_pool = FlightProcessPool(part.data_dir, part.clock)
+        self._pool = pool
 
     def close(self) -> None:
         """Close the process pool. Call it only when nothing flies."""
-        self._process_pool.close()
+        if self._pool is not None:
+            self._pool.close()
 
     def recover(self) -> None:
         """Clean up after a start of the worker.
@@ -103,10 +109,10 @@ class FlightRunner:
         try:
             self._spool.reserve(request.flight_id)
             telemetry_log(self._part.data_dir, request.flight_id).parent.mkdir(exist_ok=True)
-            if get_kind(request.vehicle_kind).connect is not None:
+            if self._pool is None or get_kind(request.vehicle_kind).connect is not None:
                 backend = self._session(request.vehicle_id)
             else:
-                backend = self._process_pool.acquire()
+                backend = self._pool.acquire()
         except (GainlineError, OSError) as error:
             return FlightOutcome(problem=f"The flight was not started: {error}")
         try:
@@ -114,36 +120,39 @@ class FlightRunner:
         finally:
             flag.add_listener(lambda _request: None)
 
-    def _fly_on_backend(self, backend: FlightProcess, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
+    def _fly_on_backend(self, backend: FlightBackend, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         """Fly the vehicle; whatever happens, release its process and return an outcome."""
         ended = FlightOutcome()
         try:
             self._phase(request, "staging")
             flag.add_listener(lambda stop: backend.cancel_flight(request.trial_id, stop))
-            for message in backend.fly(request, self._part.publish):
-                match message:
-                    case GainsStaged(read_back):
-                        ended = self._staged(request, flag, backend, read_back)
-                    case FlightLanded(record):
-                        ended = flight_rows.outcome_of(record)
-                    case SafeGainsRestored(held):
-                        ended = replace(ended, restored=held)
-                    case FlightFailure(what, unsafe, not_flown):
-                        ended = replace(
-                            ended,
-                            problem=ended.problem or what,
-                            concern=what if unsafe else "",
-                            lifted_off=ended.lifted_off and not not_flown,
-                        )
+            with closing(backend.fly(request)) as messages:
+                for message in messages:
+                    match message:
+                        case Telemetry() | FlightPhase():
+                            self._part.publish(message)
+                        case GainsStaged(read_back):
+                            ended = self._staged(request, flag, backend, read_back)
+                        case FlightLanded(record):
+                            ended = flight_rows.outcome_of(record)
+                        case SafeGainsRestored(held):
+                            ended = replace(ended, restored=held)
+                        case FlightFailure(what, unsafe, not_flown):
+                            ended = replace(
+                                ended,
+                                problem=ended.problem or what,
+                                concern=what if unsafe else "",
+                                lifted_off=ended.lifted_off and not not_flown,
+                            )
         except Exception as error:  # noqa: BLE001 - an internal error must not leave the trial without an end
             backend.close()
             return replace(ended, problem=_describe_error(error), unheard=True)
-        if not isinstance(backend, VehicleConnection):
-            self._process_pool.release(backend)
+        if self._pool is not None and type(backend) is FlightProcess:  # a connection is kept open
+            self._pool.release(backend)
         return ended
 
     def _staged(
-        self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess, read_back: dict[str, float]
+        self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
     ) -> FlightOutcome:
         """Command the takeoff if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
@@ -166,7 +175,7 @@ class FlightRunner:
         return ended
 
     def _await_takeoff_clearance(
-        self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess
+        self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend
     ) -> FlightOutcome | None:
         """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or the outcome of
         the flight that must not take place."""

@@ -36,6 +36,7 @@ from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import RETRY_S, Database, retry_until_stored
 from app.flights.connection_manager import VehicleConnectionManager
+from app.flights.flight_process import FlightProcessPool
 from app.flights.runner import FlightRunner
 from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
@@ -196,7 +197,8 @@ class Worker:
         )
         sessions = VehicleConnectionManager(part, links=is_loopback(self.settings.host))
         live = LiveServer(live_address(part.data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
-        return sessions, FlightRunner(part, session=sessions.session), live
+        pool = FlightProcessPool(part.data_dir, part.clock)
+        return sessions, FlightRunner(part, session=sessions.session, pool=pool), live
 
     def _build_job_runners(
         self, database: Database, pool: ComputePool, landscape_pool: ComputePool

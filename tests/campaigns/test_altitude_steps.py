@@ -149,7 +149,7 @@ def test_the_error_so_far_begins_with_the_first_step_and_ends_at_the_error(
 def test_flights_flown_elsewhere_are_refused_with_a_plain_sentence(client: TestClient) -> None:
     said = refused(client, {"kind": "import"}, SHORT)
     assert said["definition.experiment"] == "'altitude-steps' cannot be flown by import"
-    assert said["vehicle.kind"] == "'import' flies only takeoff, takeoff-ardupilot, takeoff-px4"
+    assert said["vehicle.kind"] == "'import' flies only takeoff"
 
 
 def test_a_vehicle_with_a_link_flies_to_no_set_point_near_its_altitude_limit(client: TestClient) -> None:

@@ -7,7 +7,6 @@ from app.db.session import Database
 from tests.builders import (
     Json,
     climb_error,
-    create_campaign,
     create_csv,
     create_imported_trial,
     create_ready_campaign,
@@ -15,6 +14,7 @@ from tests.builders import (
     get,
     problems_of,
     run_jobs,
+    store_campaign,
     upload,
 )
 from tests.fleet.vehicles import register
@@ -111,9 +111,30 @@ def test_a_step_beyond_the_limit_or_the_bounds_is_refused_with_what_would_pass(
     assert refused["gains.MPC_Z_VEL_I_ACC"] == "is missing"
 
 
-def test_a_strategy_that_needs_a_model_is_refused_with_the_reason(client: TestClient) -> None:
+REFUSED = "'takeoff-px4' is no longer offered for new campaigns; use 'altitude-steps-px4' instead"
+
+
+def test_it_is_not_offered_for_new_campaigns_which_are_told_what_replaces_it(
+    client: TestClient, database: Database
+) -> None:
     wanted = {"name": "Test", "vehicle": {"kind": "import"}, "definition": {**PX4, "strategy": "gradient"}}
-    answer = client.post("/api/campaigns", json=wanted)
+    stored, other = store_campaign(database, "import", PX4), create_ready_campaign(client, database, vehicle="import")
+    for answer in (
+        client.post("/api/campaigns", json=wanted),
+        client.post(f"/api/campaigns/{stored}/clone", json={}),
+        client.patch(f"/api/campaigns/{other['id']}", json={"definition": PX4, "version": other["version"]}),
+    ):
+        assert answer.status_code == 422
+        assert problems_of(answer)["definition.experiment"] == REFUSED
+
+
+def test_a_stored_draft_of_it_can_be_changed_and_a_strategy_that_needs_a_model_is_refused_with_the_reason(
+    client: TestClient, database: Database
+) -> None:
+    path = f"/api/campaigns/{store_campaign(database, 'import', PX4)}"
+    wanted = {"definition": {**PX4, "step_fraction": 0.1}, "version": 1}
+    assert client.patch(path, json=wanted).json()["definition"]["step_fraction"] == 0.1
+    answer = client.patch(path, json={"definition": {**PX4, "strategy": "gradient"}, "version": 2})
     assert answer.status_code == 422
     assert "there is no model for the gains of 'takeoff-px4'" in problems_of(answer)["definition.strategy"]
 
@@ -127,23 +148,22 @@ def test_flights_made_elsewhere_with_different_gains_do_not_get_in_each_others_w
     assert create_imported_trial(client, paper["id"])["gains"] == {"kp": 283, "ki": 13, "kd": 82}
 
 
-def test_a_registered_copter_flies_the_takeoff_of_its_own_gains(client: TestClient) -> None:
+def test_a_registered_copter_flies_the_steps_of_its_own_gains(client: TestClient) -> None:
     options = {"simulated": True, "autopilot": "px4"}
     vehicle = client.post("/api/vehicles", json={"name": "Copter", "kind": "mavlink", "options": options}).json()
-    assert vehicle["experiments"] == ["takeoff-px4", "altitude-steps-px4"]
+    assert vehicle["experiments"] == ["altitude-steps-px4"]
     choice = {"kind": "mavlink", "id": vehicle["id"]}
-    answer = client.post("/api/campaigns", json={"name": "Test", "vehicle": choice, "definition": PX4})
+    steps = {"experiment": "altitude-steps-px4"}
+    answer = client.post("/api/campaigns", json={"name": "Test", "vehicle": choice, "definition": steps})
     assert answer.status_code == 201, answer.text
     assert answer.json()["vehicle"]["options"]["autopilot"] == "px4"
 
 
-def test_the_catalogue_says_which_experiments_have_no_model_and_what_they_can_be_flown_with(client: TestClient) -> None:
+def test_the_catalogue_describes_experiments_without_a_model_and_offers_no_vehicle_for_them(client: TestClient) -> None:
     catalogue = get(client, "/api/catalogue")
     without = [each["name"] for each in catalogue["experiments"] if not each["has_model"]]
     assert without == ["takeoff-ardupilot", "takeoff-px4"]
-    usable = [each["name"] for each in catalogue["strategies"] if "takeoff-px4" in each["experiments"]]
-    assert usable == ["manual"]
-    assert create_campaign(client, vehicle="import", definition=PX4)["state"] == "draft"
+    assert not [each["name"] for each in catalogue["vehicle_kinds"] if set(without) & set(each["experiments"])]
 
 
 def test_what_a_log_tells_of_the_vehicle_is_kept_unless_the_campaign_is_for_another(client: TestClient) -> None:

@@ -12,7 +12,7 @@ from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
 from app.processes.calls import ComputePool
-from tests.builders import WORKER, create_campaign, create_flown_campaign, create_flown_trial, get
+from tests.builders import WORKER, create_flown_campaign, create_flown_trial, get, store_campaign
 
 Json = dict[str, Any]
 
@@ -189,8 +189,7 @@ def test_stacked_slices_stand_one_below_the_other(client: TestClient, database: 
 
 def test_without_a_model_the_card_says_so_and_nothing_is_computed(client: TestClient, database: Database) -> None:
     definition = {"experiment": "takeoff-px4", "strategy": "manual"}
-    campaign = create_campaign(client, vehicle="import", definition=definition)
-    card = card_of(client, campaign["id"])
+    card = card_of(client, store_campaign(database, "import", definition))
     assert card["state"] == "waiting"
     assert "no model" in card["reason"]
     assert waiting_jobs(client) == []

@@ -39,6 +39,15 @@ HELD: Final[Mapping[str, Mapping[str, float]]] = {
     "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 2.0, "MPC_Z_VEL_D_ACC": 0.0},
 }
 """By the vehicle's own names."""
+SETS: Final = {
+    "ardupilot": ("1,5,0.5,1,0", "1.5,5,0.5,1,0", "1.5,6,0.4,0.8,0"),
+    "px4": ("1,4,2,0", "1.2,4,2,0", "1.2,6,1.5,0"),
+}
+
+
+def by_hand(profile: str, count: int = 3) -> list[str]:
+    sets = [argument for gains in SETS[profile][:count] for argument in ("--gains", gains)]
+    return ["run", f"{profile}-altitude-steps", "--strategy", "manual", *sets]
 
 
 def said(stream: IO[str] | None, words: str) -> None:
@@ -95,9 +104,9 @@ def data_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -> None:
     out = tmp_path / "campaign.json"
     with drone("ardupilot") as address:
-        named = ("--vehicle", f"mavlink:{address}", "--max-flights", "1", "--json", out)
+        named = ("--vehicle", f"mavlink:{address}", "--json", out)
         result = subprocess.run(
-            [GAINLINE, "run", "ardupilot-takeoff", *named], capture_output=True, text=True, check=False
+            [GAINLINE, *by_hand("ardupilot", 1), *named], capture_output=True, text=True, check=False
         )
         assert result.returncode == 0, result.stderr
         held = held_by(address, "ardupilot", HELD["ardupilot"])
@@ -130,7 +139,7 @@ def fly_into_death(parameters: Connection) -> None:
     rig.switch_on_failsafes()
     with pytest.MonkeyPatch.context() as patch:
         rig.take_the_place_of_every_vehicle(patch)
-        CliRunner().invoke(app, ["run", "px4-takeoff", "--max-flights", "1"])
+        CliRunner().invoke(app, by_hand("px4", 1))
 
 
 @pytest.mark.complete
@@ -152,12 +161,12 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(
     px4_of(rig).parameters = held
     if by == "the fleet":
         pinned = Identity(system_id=1, autopilot="px4", version="1.16.0")
-        address = read_preset("px4-takeoff").vehicle.options["address"]
+        address = read_preset("px4-altitude-steps").vehicle.options["address"]
         with closing(rig.connected(pinned, folder, address=address)) as vehicle:
             assert vehicle.concern == ""
     else:
         rig.take_the_place_of_every_vehicle(monkeypatch)
-        result = CliRunner().invoke(app, ["run", "px4-takeoff", "--set", "min_battery_v=50"])
+        result = CliRunner().invoke(app, [*by_hand("px4"), "--set", "min_battery_v=50"])
         assert result.exit_code == 1, "its battery is too low for another flight"
     assert (held["MIS_TAKEOFF_ALT"], list(folder.iterdir())) == (2.5, [])
 
@@ -172,7 +181,7 @@ def test_three_sets_are_flown_by_hand_and_the_safe_gains_are_back(
     rig = LockstepRig(profile, release=autopilot, body={"scatter": 1.0})
     rig.switch_on_failsafes()
     rig.take_the_place_of_every_vehicle(monkeypatch)
-    result = CliRunner().invoke(app, ["run", f"{profile}-takeoff", "--json", str(out)])
+    result = CliRunner().invoke(app, [*by_hand(profile), "--json", str(out)])
     assert result.exit_code == 0, result.output
     held = {name: rig.drone.autopilot.parameters[name] for name in HELD[autopilot]}
     assert held == pytest.approx(HELD[autopilot])
@@ -182,9 +191,9 @@ def test_three_sets_are_flown_by_hand_and_the_safe_gains_are_back(
 def see_sets_flown(profile: str, count: int, out: Path, said: str) -> None:
     trials = json.loads(out.read_text())["trials"]
     assert [trial["outcome"] for trial in trials] == ["valid"] * count, [trial["reason"] for trial in trials]
-    assert [trial["gains"] for trial in trials] == read_preset(f"{profile}-takeoff").gains[:count]
-    assert all(0.05 < trial["error"] < 0.6 for trial in trials)
-    assert [(trial["kind"], trial["predicted_error"]) for trial in trials] == [("manual", None)] * count
+    assert [",".join(f"{gain:g}" for gain in trial["gains"].values()) for trial in trials] == [*SETS[profile][:count]]
+    assert all(0.01 < trial["error"] < 0.6 for trial in trials), [trial["error"] for trial in trials]
+    assert [trial["kind"] for trial in trials] == ["manual"] * count
     assert "The safe gains are restored and read back:" in said
 
 
@@ -194,7 +203,7 @@ def test_gains_that_a_vehicle_is_never_given_are_refused_whoever_overrules(monke
     rig.take_the_place_of_every_vehicle(monkeypatch)
     written = len(rig.writes)
     gains = "MPC_Z_P=9,MPC_Z_VEL_P_ACC=4,MPC_Z_VEL_I_ACC=2,MPC_Z_VEL_D_ACC=0"
-    result = CliRunner().invoke(app, ["run", "px4-takeoff", "--gains", gains, "--overrule", "to see it"])
+    result = CliRunner().invoke(app, [*by_hand("px4", 0), "--gains", gains, "--overrule", "to see it"])
     assert result.exit_code == 1
     assert "gains.MPC_Z_P: must be between 0.1 and 1.5, got 9" in " ".join(result.stderr.split())
     assert len(rig.writes) == written

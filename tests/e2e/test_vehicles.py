@@ -107,7 +107,7 @@ def test_a_campaign_with_a_registered_vehicle_has_its_experiment(dashboard: Dash
     dashboard.button("Create campaign").click()
     page.wait_for_url(re.compile(r"/campaigns/\d+$"))
     campaign = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
-    assert (campaign["vehicle"]["id"], campaign["definition"]["experiment"]) == (vehicle_id, "takeoff-px4")
+    assert (campaign["vehicle"]["id"], campaign["definition"]["experiment"]) == (vehicle_id, "altitude-steps-px4")
 
 
 def left_in_the_air(dashboard: Dashboard, server: Server, states: States, drone: Drone, name: str) -> int:

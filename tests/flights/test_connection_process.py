@@ -164,7 +164,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
 
     line.on_staged = refuse
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
-    process._fly(flight_of(rig, tmp_path))
+    process._carry_out(flight_of(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
     assert (trouble.not_flown, trouble.unsafe) == (True, not takes_its_safe_gains)
@@ -178,7 +178,7 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(
 ) -> None:
     """Observed defect: the process was suspended for 20 s, and the vehicle took off unexpectedly afterwards."""
     line.workers_end.send(TakeOffCommand(by_s=time.monotonic() - 0.001))
-    process._fly(flight_of(rig, tmp_path))
+    process._carry_out(flight_of(rig, tmp_path))
     staged, restored, failure, _ = (said for said in line.said if not isinstance(said, ConnectionOpened))
     assert (staged, restored) == (GainsStaged(dict(TUNED)), SafeGainsRestored(dict(SAFE)))
     assert isinstance(failure, FlightFailure)
@@ -207,7 +207,7 @@ def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
 
     line.on_staged = watch
     line.workers_end.send(TakeOffCommand(by_s=time.monotonic() + 3600.0))
-    process._fly(flight_of(rig, tmp_path))
+    process._carry_out(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert (failure.not_flown, failure.unsafe, "too late" in failure.what) == (True, False, True)
     assert SafeGainsRestored(dict(SAFE)) in line.said
@@ -328,7 +328,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     line.workers_end.send(CancelFlight(9, StopRequest("of another flight")))
     line.on_staged = lambda: line.workers_end.send(CancelTakeOff())
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
-    process._fly(flight_of(rig, tmp_path))
+    process._carry_out(flight_of(rig, tmp_path))
     answers = [said for said in line.said if isinstance(said, CommandForwarded)]
     assert [(said.command.order, said.problem, said.is_awaited) for said in answers[:2]] == [
         ("land", "", False),
@@ -347,7 +347,7 @@ def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_groun
 ) -> None:
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_REQUEST_READ", LAND)
-    process._fly(flight_of(rig, tmp_path))
+    process._carry_out(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert ("land was commanded" in failure.what, failure.not_flown, failure.unsafe) == (True, True, False)
     assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
@@ -360,7 +360,7 @@ def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_o
 ) -> None:
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_SET", MOTORS_OFF, nth=2)
-    process._fly(flight_of(rig, tmp_path))
+    process._carry_out(flight_of(rig, tmp_path))
     assert stop_outcomes(process, line) == [""]
     assert not any(isinstance(said, FlightFailure) for said in line.said)
     assert any(isinstance(said, FlightLanded) for said in line.said)
@@ -402,7 +402,7 @@ def test_motors_off_is_done_only_once_the_vehicle_has_confirmed_it(
         monkeypatch.setattr(
             line, "receive", lambda: ordered.pop() if ordered and rig.drone.body.altitude_m > 1.0 else receive()
         )
-        process._fly(flight_of(rig, tmp_path))
+        process._carry_out(flight_of(rig, tmp_path))
     else:
         process._forward_command(MOTORS_OFF)
     problem = "" if is_confirmed else "The vehicle has not confirmed that its motors stopped."

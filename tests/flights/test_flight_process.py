@@ -16,7 +16,7 @@ from app.core.clock import REAL_TIME
 from app.flights.flight_loop import FlightMonitor, run_simulations
 from app.flights.flight_process import FlightProcess
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
-from app.live.messages import MAX_LINE_BYTES, FlightPhase, PublishedMessage, Telemetry, encode
+from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
 from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.flight_end import StopRequest
@@ -60,15 +60,11 @@ def fly(
 ) -> list[FlightMessage]:
     heard: list[FlightMessage] = []
 
-    def hear(said: FlightMessage | PublishedMessage) -> None:
-        assert isinstance(said, FlightMessage)
-        heard.append(said)
-        on_said(said)
-
-    for said in flight_process.fly(asked, hear):
+    for said in flight_process.fly(asked):
         if isinstance(said, GainsStaged):
             flight_process.take_off()
-        hear(said)
+        heard.append(said)
+        on_said(said)
     return heard
 
 
@@ -144,7 +140,7 @@ def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(flight
 
 def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> None:
     heard = []
-    for said in flight_process.fly(flight_of(), lambda _shown: None):
+    for said in flight_process.fly(flight_of()):
         heard.append(said)
         flight_process.cancel_take_off()
     assert heard == [GainsStaged(GAINS)]
@@ -152,7 +148,7 @@ def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> No
 
 def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(flight_process: FlightProcess) -> None:
     heard = []
-    for said in flight_process.fly(flight_of(speed=1.0), lambda _shown: None):
+    for said in flight_process.fly(flight_of(speed=1.0)):
         heard.append(said)
         if isinstance(said, GainsStaged):
             flight_process.cancel_flight(1, StopRequest("not today"))

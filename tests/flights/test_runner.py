@@ -3,7 +3,7 @@
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from datetime import timedelta
 
 import pytest
@@ -16,14 +16,13 @@ from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow, VehicleRow
 from app.db.session import Database
 from app.fleet.service import hold_gains
-from app.flights.flight_process import FlightProcess
+from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import (
     FlightFailure,
     FlightMessage,
     FlightRequest,
     GainsStaged,
-    Publish,
     SafeGainsRestored,
 )
 from app.flights.runner import FlightRunner
@@ -46,18 +45,17 @@ class RunnerFixture:
         self.abort_registry = AbortRegistry()
         self.heard: list[PublishedMessage] = []
         self.watch: Watch = lambda _said: None
-        self.runner = FlightRunner(
-            WorkerPart(
-                database=database,
-                data_dir=settings.data_dir,
-                abort_registry=self.abort_registry,
-                publish=self._hear,
-                worker="tests",
-                closing=threading.Event(),
-                clock=SimulatedClock(),
-            ),
-            session=self._session,
+        part = WorkerPart(
+            database=database,
+            data_dir=settings.data_dir,
+            abort_registry=self.abort_registry,
+            publish=self._hear,
+            worker="tests",
+            closing=threading.Event(),
+            clock=SimulatedClock(),
         )
+        self.pool = FlightProcessPool(part.data_dir, part.clock)
+        self.runner = FlightRunner(part, session=self._session, pool=self.pool)
 
     def fly_next(self) -> None:
         task = self.runner.claim()
@@ -65,7 +63,7 @@ class RunnerFixture:
         self.runner.carry_out(task)
 
     def kill_processes(self) -> None:
-        for process in self.runner._process_pool._waiting:
+        for process in self.pool._waiting:
             os.kill(pid_of(process), signal.SIGKILL)
 
     def _session(self, vehicle_id: int) -> FlightProcess:
@@ -310,7 +308,7 @@ class Refusing:
     alive = True
     takes_its_safe_gains = True
 
-    def fly(self, request: FlightRequest, _publish: Publish) -> Iterator[FlightMessage]:
+    def fly(self, request: FlightRequest) -> Generator[FlightMessage]:
         yield GainsStaged(dict(request.gains))
         if self.takes_its_safe_gains:
             yield SafeGainsRestored(dict(request.safe_gains))
@@ -326,7 +324,7 @@ def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
     client: TestClient, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(field.runner._process_pool, "acquire", Refusing)
+        patched.setattr(field.pool, "acquire", Refusing)
         field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
@@ -355,7 +353,7 @@ def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gain
     then: str,
 ) -> None:
     make_vehicle_real(database)
-    monkeypatch.setattr(field.runner._process_pool, "acquire", backend)
+    monkeypatch.setattr(field.pool, "acquire", backend)
     field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)

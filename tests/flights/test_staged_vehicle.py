@@ -102,7 +102,7 @@ def staged_for(
     process = started(rig, line, folder, SAFE[rig.autopilot])
     assert process._vehicle.concern == ""
     order = flight_of(rig, folder)
-    process._fly(replace(order, gains=GAINS[rig.autopilot], safe_gains=SAFE[rig.autopilot]))
+    process._carry_out(replace(order, gains=GAINS[rig.autopilot], safe_gains=SAFE[rig.autopilot]))
     assert process._vehicle.read_gains() == SAFE[rig.autopilot]
     assert not rig.drone.autopilot.armed
     return line

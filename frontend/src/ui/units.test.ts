@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Catalogue } from "../api/types";
-import { gainTitles, unitsOf } from "./units";
+import { gainTitles, offeredExperiments, replacementOf, unitsOf } from "./units";
 
 const catalogue = {
   experiments: [
@@ -29,4 +29,16 @@ test("a gain has a name that says what it is, once the catalogue is there", () =
 
 test("until the catalogue is there a takeoff is likeliest", () => {
   expect(unitsOf(undefined, "takeoff").error).toBe("m");
+});
+
+test("an experiment that no vehicle flies in a new campaign is replaced by another of its autopilot", () => {
+  const [takeoff, old, steps] = ["takeoff", "takeoff-px4", "altitude-steps-px4"];
+  const px4 = {
+    experiments: [takeoff, old, steps].map((name) => ({ name, title: `Title of ${name}` })),
+    vehicle_kinds: [{ experiments: [takeoff] }, { experiments: [takeoff, steps] }],
+    autopilots: [{ experiments: [takeoff] }, { experiments: [old, steps] }],
+  } as unknown as Catalogue;
+  expect(offeredExperiments(px4).map(({ name }) => name)).toEqual([takeoff, steps]);
+  expect(replacementOf(px4, old)).toBe("Title of altitude-steps-px4");
+  expect(replacementOf(px4, steps)).toBeUndefined();
 });

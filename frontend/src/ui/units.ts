@@ -38,6 +38,20 @@ export function useHasModel(experiment: string): boolean {
   return useCatalogue().data?.experiments.find(({ name }) => name === experiment)?.has_model ?? true;
 }
 
+/** Experiments that a new campaign can have: those that a kind of vehicle flies. */
+export function offeredExperiments({ experiments, vehicle_kinds }: Catalogue) {
+  return experiments.filter(({ name }) => vehicle_kinds.some((kind) => kind.experiments.includes(name)));
+}
+
+/** Title of the experiment that new campaigns fly instead of this one, with gains of the same autopilot; undefined
+ * while this one is offered. */
+export function replacementOf(catalogue: Catalogue, experiment: string): string | undefined {
+  const offered = offeredExperiments(catalogue);
+  if (offered.some(({ name }) => name === experiment)) return undefined;
+  const own = catalogue.autopilots.find(({ experiments }) => experiments.includes(experiment));
+  return offered.find(({ name }) => own?.experiments.includes(name))?.title;
+}
+
 export function useUnits(experiment: string): Units {
   return unitsOf(useCatalogue().data, experiment);
 }

@@ -1,4 +1,4 @@
-import { ActionIcon, Anchor, Button, Group, TextInput, Title } from "@mantine/core";
+import { ActionIcon, Anchor, Button, Group, Text, TextInput, Title } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
 import { Link } from "react-router";
@@ -12,6 +12,7 @@ import { StateBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
 import { ErrorNotice } from "../../ui/Notices";
 import { campaignStateLabel } from "../../ui/states";
+import { replacementOf } from "../../ui/units";
 import classes from "./CampaignPage.module.css";
 import { settingsOf } from "./campaignSettings";
 
@@ -20,6 +21,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const [renaming, setRenaming] = useState(false);
   const catalogue = useCatalogue().data;
   const vehicle = useVehicle(campaign.vehicle.id) ?? campaign.vehicle;
+  const replacement = catalogue && replacementOf(catalogue, campaign.definition.experiment ?? "takeoff");
   return (
     <header className={classes["header"]}>
       <Group gap="0 16px" align="center" className={renaming ? undefined : (classes["heading"] ?? "")}>
@@ -61,6 +63,12 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
           All campaigns
         </Anchor>
       </div>
+      {replacement !== undefined && (
+        <Text c="dimmed" fz="small">
+          New campaigns fly “{replacement}” instead, because the gains hardly change the error of a takeoff with this
+          autopilot.
+        </Text>
+      )}
     </header>
   );
 }

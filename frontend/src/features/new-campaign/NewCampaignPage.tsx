@@ -12,6 +12,7 @@ import { SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
 import { FoldedSection, FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
 import { FormErrorNotice } from "../../ui/Notices";
+import { offeredExperiments } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
 import { DonorPicker } from "./DonorPicker";
@@ -137,7 +138,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       {catalogue.experiments.length > 1 && (
         <SelectField
           label={LABELS["definition.experiment"]}
-          data={catalogue.experiments.map(({ name, title }) => ({ value: name, label: title }))}
+          data={offeredExperiments(catalogue).map(({ name, title }) => ({ value: name, label: title }))}
           value={form.experiment}
           error={reasons["definition.experiment"]}
           onChange={(value) => setForm(withExperiment(form, catalogue, value))}
