@@ -25,7 +25,7 @@ from app.core.tuning.landscape import Landscape, LandscapeGrid, free_gains, plan
 from app.db.models import CampaignRow, JobRow, ProposalRow
 from app.db.types import JsonObject
 from app.figures.base import Card, card_of
-from app.figures.landscape import LandscapeFigure, Search, Tried
+from app.figures.landscape import LandscapeFigure
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
 
@@ -42,7 +42,7 @@ class LandscapeAnswer:
     wanted: bool = False
 
 
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> LandscapeAnswer:
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> LandscapeAnswer:
     """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
@@ -57,7 +57,8 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stac
     if found is None:
         return _not_yet(session, campaign, proposal)
     drawn = history_of(session, campaign_id, curves=False)
-    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
+    tried = [step["gains"] for step in proposal.explanation.get("ladder", ())]
+    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, tried, theme)))
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
@@ -160,15 +161,3 @@ def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, floa
     number = proposal.explanation.get("base_flight")
     base = next((flight for flight in past.flights if flight.number == number), None)
     return dict(proposal.gains if base is None else base.gains)
-
-
-def _search(proposal: ProposalRow) -> Search:
-    """The strategy's search for the next gains, from the proposal's explanation."""
-    explanation = proposal.explanation
-    return Search(
-        gradient=dict(explanation.get("gradient", {})),
-        direction=dict(explanation.get("direction", {})),
-        tried=tuple(
-            Tried(dict(step["gains"]), float(step["predicted_error"])) for step in explanation.get("ladder", ())
-        ),
-    )

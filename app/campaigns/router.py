@@ -165,7 +165,6 @@ def get_landscape(
     asking: RequestContextDep,
     campaign_id: Id,
     theme: Theme = "light",
-    stacked: Annotated[bool, Query(description="one column of slices, for a narrow page")] = False,
 ) -> Card:
     """The gains as a path over the error that the strategy's model predicts, two gains at a time.
 
@@ -173,7 +172,7 @@ def get_landscape(
     done the card is `waiting`.
     """
     with database.read() as session:
-        asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
+        asked = landscapes.landscape_card(session, campaign_id, theme)
     if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
         with database.write() as session:
             landscapes.request_landscape(session, campaign_id)

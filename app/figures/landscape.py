@@ -1,70 +1,61 @@
-"""A campaign's gains as a path over the model's error: contours over two gains at a time."""
+"""A campaign's gains as a path over the model's error, two gains at a time: a part of the proposal's details."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, ClassVar, Final
+from math import ceil, floor, log10
+from typing import ClassVar, Final
 
 import numpy as np
 
 from app.core.policy import Gain, Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
+from app.figures.base import Card, Column, Table, Trace, ready, scatter
 from app.figures.data import FlightData, History
-from app.figures.slices import (
-    LEGEND,
-    Box,
-    Scale,
-    contour_traces,
-    holds,
-    mark_box,
-    number_box,
-    number_position,
-    numbers,
-    padded,
-    scale_of,
-    to_edge,
-)
 
-LONGEST_PATH: Final = 60
-"""Largest number of latest flights in the path; the first and the best are always included."""
-_GAP: Final = 0.09
-_STAR_PX: Final = 17
-"""Size of the star, and of the best flight's own invisible mark under it, which keeps its number clear of the star."""
-_STACK_GAP: Final = 0.085
+LEVELS: Final = 9
+"""Approximate number of contours."""
+SHOWN_SHARE: Final = 0.8
+"""Share of all points covered by the scale."""
+_TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
+"""Strength of the colour from the bottom to the top of the scale: the lower the error, the stronger the colour."""
+_GAP: Final = 0.085
+"""Height between two slices as a share of the whole."""
+_EDGE: Final = 0.03
+"""Room for marks on the edge of a slice, as a share of its range."""
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """One step evaluated on the model, and the error predicted there."""
+class Scale:
+    """Contours from `low` to `high` every `step`, in the error's unit; higher values have no colour."""
 
-    gains: Gains
-    predicted_error: float
+    low: float
+    high: float
+    step: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
-    """How the next gains were found: the error's gradient, the direction of the line, and the steps evaluated on it."""
-
-    gradient: Gains
-    direction: Gains
-    tried: tuple[Tried, ...] = ()
+def scale_of(slices: Sequence[Slice]) -> Scale:
+    """Common scale of all slices: from the lowest error to the 80 % quantile of their points, in steps of 1, 2 or 5."""
+    errors = np.array([error for one in slices for row in one.errors for error in row if error is not None])
+    low, high = float(errors.min()), float(np.quantile(errors, SHOWN_SHARE))
+    width = max(high - low, 1e-3 * max(abs(high), 1e-9)) / LEVELS
+    decade = 10.0 ** floor(log10(width))
+    step = next(round(factor * decade, 12) for factor in (1, 2, 5, 10) if factor * decade >= width)
+    return Scale(low=floor(low / step) * step, high=ceil(high / step) * step, step=step)
 
 
 @dataclass(frozen=True, slots=True)
 class LandscapeFigure:
-    """Table columns: `what`, one per gain, `predicted` and `measured` error; the rows are the flights, the steps
-    evaluated, the proposal, and the lowest point of each slice.
+    """Table columns: `what`, one per gain, `predicted` and `measured` error; the rows are the flights, the proposal,
+    and the lowest point of each slice. `tried` are gains that the strategy evaluated on the model.
 
-    Each trace carries in `meta` its role (model, beyond, path, best, line, tried, proposed) and its slice, from 1.
+    Each trace carries in `meta` its role: model, path, best, tried, proposed.
     """
 
     history: History
     landscape: Landscape
-    search: Search
+    tried: Sequence[Gains] = ()
     theme_name: theme.ThemeName = "light"
-    stacked: bool = False
     name: ClassVar[str] = "landscape"
     title: ClassVar[str] = "Error landscape of the model"
 
@@ -77,180 +68,135 @@ class LandscapeFigure:
         traces: list[Trace] = []
         axes: dict[str, object] = {}
         for index, one in enumerate(slices, start=1):
-            named = {LEGEND, *(trace["legendgroup"] for trace in traces)}
+            drawn = (self._contours(palette, one, scale), *self._marks(palette, one))
             traces += [
-                trace | {"showlegend": trace["legendgroup"] not in named}
-                for trace in self._slice(palette, index, one, scale)
+                trace | theme.on(index) | {"legendgroup": trace["name"], "showlegend": index == 1} for trace in drawn
             ]
             axes |= self._axes(palette, index, one)
         layout = theme.layout(
             palette,
             uirevision="landscape",
-            margin={"l": 8, "r": 14, "t": 12, "b": 92 if self.stacked else 76},
+            margin={"l": 8, "r": 14, "t": 12, "b": 92},
             annotations=[self._note(palette, scale)],
             **axes,
         )
         return ready(self, traces, layout, summary=self._summary(scale), table=self._table())
 
-    def _slice(self, palette: theme.Palette, index: int, one: Slice, scale: Scale) -> Iterator[Trace]:
-        """All traces of a slice: the contours, then what lies over them."""
-        yield from contour_traces(palette, index, one, scale, self.history.error_unit, self._taken(one))
-        draw = partial(_marks, index, one)
-        ends = to_edge(one, self.landscape.centre, self.search.direction)
-        if ends is not None:
-            name = "Along gradient" if self.search.tried else "To the optimum"
-            yield draw(ends, "line", name, "lines", line=theme.line(palette.prediction, 2, "dot"))
-        inside = [step for step in self.search.tried if holds(one, step.gains)]
-        if inside:
-            unit = self.history.error_unit
-            yield draw(
-                [step.gains for step in inside],
-                "tried",
-                "Tried on model",
-                "markers",
-                marker=theme.solid(palette.prediction, size=6, symbol="circle-open", line={"width": 1.5}),
-                hovertext=[f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
-            )
-        yield from self._path(palette, one, draw)
-        yield from self._proposed(palette, draw)
-
-    def _taken(self, one: Slice) -> list[Box]:
-        """The room of all marks and numbers in a slice."""
-        shown = self._shown()
-        marked = [flight.gains for flight in (*shown, *self.history.next_flights)]
-        texts = zip(shown, self._texts(one), strict=True)
-        return [
-            *(mark_box(one, gains) for gains in marked),
-            *(mark_box(one, step.gains) for step in self.search.tried),
-            *(number_box(one, flight.gains, text) for flight, text in texts if text),
-        ]
-
-    def _texts(self, one: Slice) -> list[str]:
-        """The numbers beside the flights that are shown."""
-        proposal = self.history.proposal
-        return numbers(self._shown(), self.history.best, one, aside=None if proposal is None else proposal.gains)
-
-    def _shown(self) -> list[FlightData]:
-        """All flights, or if there are many, the latest together with the first and the best before them."""
-        earlier = self.history.flights[:-LONGEST_PATH]
-        kept = [flight for flight in earlier if flight is earlier[0] or flight is self.history.best]
-        return [*kept, *self.history.flights[-LONGEST_PATH:]]
-
-    def _path(self, palette: theme.Palette, one: Slice, draw: Callable[..., Trace]) -> Iterator[Trace]:
-        flights, best = self._shown(), self.history.best
-        if not flights:
-            return
-        unit, texts = self.history.error_unit, self._texts(one)
-        stars = [flight is best for flight in flights]
-        yield draw(
-            [flight.gains for flight in flights],
-            "path",
-            "Flights in order" if len(flights) == len(self.history.flights) else f"Last {LONGEST_PATH} flights",
-            "lines+markers+text",
-            line=theme.line(palette.ink, 1.5),
-            marker={
-                "size": [_STAR_PX if star else 7 for star in stars],
-                "opacity": [0 if star else 1 for star in stars],
-                "color": palette.surface,
-                "line": {"width": 1.5, "color": palette.ink},
+    def _contours(self, palette: theme.Palette, one: Slice, scale: Scale) -> Trace:
+        return {
+            "type": "contour",
+            "name": "Predicted error",
+            "x": list(one.x_values),
+            "y": list(one.y_values),
+            "z": [list(row) for row in one.errors],
+            "zmin": scale.low,
+            "zmax": scale.high,
+            "contours": {
+                "start": scale.low,
+                "end": scale.high,
+                "size": scale.step,
+                "coloring": "fill",
+                "showlabels": True,
+                "labelfont": {"size": 11, "color": palette.ink},
             },
-            text=texts,
-            textposition=[
-                number_position(one, flight.gains, text) for flight, text in zip(flights, texts, strict=True)
-            ],
-            textfont={"size": 12, "color": palette.ink, "weight": 700, "shadow": "auto"},
-            hovertext=[_hover_text(flight, unit) for flight in flights],
-        )
-        if best is not None:
-            yield draw(
-                [best.gains],
-                "best",
-                f"Best, flight {best.number}",
-                "markers",
-                marker=_edged(palette, palette.best, size=_STAR_PX, symbol="star"),
-                hovertext=[_hover_text(best, unit)],
-            )
+            "colorscale": [[place, theme.mixed(palette.best, palette.surface, share)] for place, share in _TINTS],
+            "showscale": False,
+            "line": {"width": 0.9, "color": theme.with_opacity(palette.dim, 0.75), "smoothing": 0},
+            "meta": {"role": "model"},
+            "hovertemplate": f"{one.x} %{{x:.4~g}}, {one.y} %{{y:.4~g}}<br>"
+            f"<b>%{{z:.4f}} {self.history.error_unit}</b> predicted<extra></extra>",
+        }
 
-    def _proposed(self, palette: theme.Palette, draw: Callable[..., Trace]) -> Iterator[Trace]:
-        proposal = self.history.proposal
-        if proposal is None:
-            return
-        prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
-        yield draw(
-            [proposal.gains],
-            "proposed",
-            f"Next, flight {proposal.number}",
-            "markers",
-            marker=_edged(palette, palette.prediction, size=13, symbol="diamond"),
-            hovertext=[
-                f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
-            ],
-        )
+    def _marks(self, palette: theme.Palette, one: Slice) -> Iterator[Trace]:
+        """The flights in order, the best of them, and the gains that were tried and that are proposed."""
+        flights, best, proposal = self.history.flights, self.history.best, self.history.proposal
+        edge = {"width": 1.5, "color": palette.surface}
+        if self.tried:
+            mark = theme.solid(palette.prediction, size=6, symbol="circle-open", line={"width": 1.5})
+            yield _points(one, self.tried, "tried", "Tried on model", marker=mark)
+        if flights:
+            yield _points(
+                one,
+                [flight.gains for flight in flights],
+                "path",
+                "Flights in order",
+                mode="lines+markers+text",
+                line=theme.line(palette.ink, 1.5),
+                marker={"size": 7, "color": palette.surface, "line": {"width": 1.5, "color": palette.ink}},
+                text=self._numbers(one),
+                textposition="top center",
+                textfont={"size": 12, "color": palette.ink, "weight": 700, "shadow": "auto"},
+                hovertext=[self._hover_text(flight) for flight in flights],
+            )
+        if best is not None:
+            mark, told = theme.solid(palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
+            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=told)
+        if proposal is not None:
+            mark = theme.solid(palette.prediction, size=13, symbol="diamond", line=edge)
+            name, told = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
+            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=told)
+
+    def _numbers(self, one: Slice) -> list[str]:
+        """The numbers of the first, the best and the latest flight, in one text where they have the same place."""
+        flights, best = self.history.flights, self.history.best
+        leading = sorted({flight.number for flight in (flights[0], best or flights[0], flights[-1])})
+        places = {flight.number: (flight.gains[one.x], flight.gains[one.y]) for flight in flights}
+        shared: dict[tuple[float, float], list[int]] = {}
+        for number in leading:
+            shared.setdefault(places[number], []).append(number)
+        texts = {numbers[0]: ", ".join(map(str, numbers)) for numbers in shared.values()}
+        return [texts.get(flight.number, "") for flight in flights]
+
+    def _hover_text(self, flight: FlightData) -> str:
+        unit = self.history.error_unit
+        error = "no error" if flight.error is None else f"{flight.error:.4f} {unit} measured"
+        return f"Flight {flight.number}, {error}"
 
     def _axes(self, palette: theme.Palette, index: int, one: Slice) -> dict[str, object]:
-        across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
-        named = {gain.name: gain for gain in self.history.gains}
-        suffix = theme.suffix(index)
-        axes = (("x", "y", one.x, one.x_values, across, 5), ("y", "x", one.y, one.y_values, up, 6))
+        titles = {gain.name: _title(gain) for gain in self.history.gains}
+        own, up = theme.suffix(index), theme.stacked(index, len(self.landscape.slices), _GAP)
+        x: dict[str, object] = {"anchor": f"y{own}", "range": _padded(one.x_values), "nticks": 5, "showgrid": False}
+        y = {"anchor": f"x{own}", "range": _padded(one.y_values), "nticks": 6, "showgrid": False, "domain": up}
         return {
-            f"{own}axis{suffix}": theme.axis(
-                palette,
-                _title(named[gain]),
-                domain=place,
-                anchor=f"{other}{suffix}",
-                range=padded(values),
-                nticks=ticks,
-                showgrid=False,
-            )
-            for own, other, gain, values, place, ticks in axes
+            f"xaxis{own}": theme.axis(palette, titles[one.x], **x),
+            f"yaxis{own}": theme.axis(palette, titles[one.y], **y),
         }
 
     def _note(self, palette: theme.Palette, scale: Scale) -> dict[str, object]:
         """Text below the slices: where they lie, and the contour interval."""
         held = ", ".join(f"{name} {value:.4g}" for name, value in self.landscape.centre.items())
-        between = "<br>" if self.stacked else " · "
-        text = f"Slices through {held}{between}contours every {scale.step:g} {self.history.error_unit}"
+        text = f"Slices through {held}<br>contours every {scale.step:g} {self.history.error_unit}"
         return theme.note(palette, text, y=0, yshift=-52, yanchor="top", align="left")
 
     def _summary(self, scale: Scale) -> str:
         pairs = ", ".join(f"{one.y} over {one.x}" for one in self.landscape.slices)
         held = ", ".join(f"{name} {value:g}" for name, value in self.landscape.centre.items())
+        still = self.landscape.still
+        fixed = f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} fixed"
         parts = [
             f"The error that the model predicts, {pairs}.",
             f"The slices are through {held}; flights with other values of them are drawn too.",
-            f"Contours every {scale.step:g} {self.history.error_unit}; values above {scale.high:g} are shaded.",
+            f"Contours every {scale.step:g} {self.history.error_unit}, up to {scale.high:g}.",
+            *([f"The gains with the largest gradient are varied; {fixed}."] if still else []),
         ]
-        if self.landscape.still:
-            still = self.landscape.still
-            fixed = f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} fixed"
-            parts.append(f"The gains with the largest gradient are varied; {fixed}.")
         return " ".join(parts)
 
     def _table(self) -> Table:
-        history = self.history
+        history, gains = self.history, self.history.gains
         columns = (
             Column("what", "What"),
-            *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in history.gains),
+            *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in gains),
             Column("predicted", "Predicted error", history.error_unit, 4),
             Column("measured", "Measured error", history.error_unit, 4),
         )
-        rows: list[tuple[Cell, ...]] = [
-            self._row(f"Flight {flight.number}", flight.gains, flight.predicted_error, flight.error)
-            for flight in history.flights
+        rows = [(f"Flight {each.number}", each.gains, each.predicted_error, each.error) for each in history.flights]
+        if (next_one := history.proposal) is not None:
+            rows.append((f"Flight {next_one.number}, proposed", next_one.gains, next_one.predicted_error, None))
+        rows += [
+            (f"Lowest of {one.y} over {one.x}", *lowest(one, self.landscape.centre), None)
+            for one in self.landscape.slices
         ]
-        rows += [self._row("Tried on the model", step.gains, step.predicted_error, None) for step in self.search.tried]
-        if history.proposal is not None:
-            next_one = history.proposal
-            rows.append(
-                self._row(f"Flight {next_one.number}, proposed", next_one.gains, next_one.predicted_error, None)
-            )
-        for one in self.landscape.slices:
-            gains, error = lowest(one, self.landscape.centre)
-            rows.append(self._row(f"Lowest of {one.y} over {one.x}", gains, error, None))
-        return Table(columns, tuple(rows))
-
-    def _row(self, what: str, gains: Gains, predicted: float | None, measured: float | None) -> tuple[Cell, ...]:
-        return (what, *(gains[gain.name] for gain in self.history.gains), predicted, measured)
+        return Table(columns, tuple((what, *(at[gain.name] for gain in gains), *errors) for what, at, *errors in rows))
 
 
 def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
@@ -260,41 +206,27 @@ def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
     return {**centre, one.x: one.x_values[column], one.y: one.y_values[row]}, float(errors[row, column])
 
 
-def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str, mode: str, **more: Any) -> Trace:
+def _points(
+    one: Slice,
+    gains: Sequence[Gains],
+    role: str,
+    name: str,
+    *,
+    mode: str = "markers",
+    hovertext: Sequence[str] = (),
+    **more: object,
+) -> Trace:
     """A trace through these gains, projected onto the slice; a `hovertext` is shown with the two gains."""
-    if "hovertext" in more:
-        more["hovertemplate"] = f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>"
-    return scatter(
-        name,
-        ([each[one.x] for each in gains], [each[one.y] for each in gains]),
-        role=role,
-        about={"slice": index},
-        mode=mode,
-        **theme.on(index),
-        legendgroup=role,
-        cliponaxis=True,
-        **more,
-    )
+    if hovertext:
+        shown = f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>"
+        more |= {"hovertext": hovertext, "hovertemplate": shown}
+    places = [each[one.x] for each in gains], [each[one.y] for each in gains]
+    return scatter(name, places, role=role, about={}, mode=mode, cliponaxis=True, **more)
 
 
-def _edged(palette: theme.Palette, colour: str, **mark: object) -> dict[str, object]:
-    """A filled mark that stands out from the contours and the path."""
-    return theme.solid(colour, **mark, line={"width": 1.5, "color": palette.surface})
-
-
-def _hover_text(flight: FlightData, unit: str) -> str:
-    error = "no error" if flight.error is None else f"{flight.error:.4f} {unit} measured"
-    return f"Flight {flight.number}, {error}"
-
-
-def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[float]]:
-    """Horizontal and vertical domain of a slice: side by side, or stacked with the first on top."""
-    gap = _STACK_GAP if stacked else _GAP
-    size = (1.0 - gap * (count - 1)) / count
-    first = (index - 1) * (size + gap)
-    if stacked:
-        return [0.0, 1.0], [max(0.0, 1.0 - first - size), 1.0 - first]
-    return [first, min(1.0, first + size)], [0.0, 1.0]
+def _padded(values: Sequence[float]) -> list[float]:
+    room = _EDGE * (values[-1] - values[0])
+    return [values[0] - room, values[-1] + room]
 
 
 def _title(gain: Gain) -> str:

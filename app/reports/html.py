@@ -3,7 +3,6 @@
 import base64
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -19,7 +18,7 @@ from app.common.conflict_checks import state_label
 from app.core import formatting
 from app.core.tuning.strategy import Interval
 from app.db.models import TrialPhotoRow
-from app.figures.base import Card, Cell, Column
+from app.figures.base import Cell, Column
 from app.reports.service import Report
 
 if TYPE_CHECKING:
@@ -155,7 +154,6 @@ def _environment() -> "Environment":
         "count": formatting.count,
         "flights": formatting.named_flights,
         "cell": _cell,
-        "panels": _panels,
         "data_uri": _data_uri,
         "mebibytes": lambda size: f"{size / 2**20:g} MiB",
     }
@@ -188,12 +186,6 @@ def _instant(at: datetime | None) -> str:
 
 def _signed_gain(change: float) -> str:
     return f"+{formatting.gain(change)}" if change > 0 else formatting.gain(change)
-
-
-def _panels(card: Card) -> int:
-    """Number of panels in the figure."""
-    layout = None if card.figure is None else card.figure["layout"]
-    return sum(name.startswith("xaxis") for name in layout) if isinstance(layout, Mapping) else 0
 
 
 def _data_uri(photo: TrialPhotoRow) -> Markup:

@@ -16,7 +16,6 @@ from app.autopilots.registry import EXPERIMENTS
 from app.campaigns import figure_data
 from app.campaigns import service as campaigns
 from app.campaigns.history import FLOWN
-from app.campaigns.landscapes import landscape_card
 from app.campaigns.schemas import Campaign, Start, StopRule
 from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.trials import service as trials_service
@@ -296,7 +295,6 @@ def report_of(session: Session, campaign_id: int) -> Report:
     if frozen is not None and frozen != vehicle.safe_gains:
         safe_gains = f"{format_gains(frozen)} at the first flight, now {safe_gains}"
     past = figure_data.history_of(session, campaign_id, curves=True)
-    landscape = landscape_card(session, campaign_id, "light", stacked=True).card
     return Report(
         campaign=campaign,
         statistics=statistics,
@@ -305,10 +303,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
         gains=experiment.space.gains,
         what=describe_vehicle(campaign, experiment, vehicle.identity, safe_gains),
         how=describe_method(campaign, experiment),
-        cards=(
-            *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
-            *((landscape,) if landscape.state == "ready" else ()),  # only if it has been computed already
-        ),
+        cards=tuple(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
         remarks=tuple(remarks_on(session, campaign_id, trials)),
         photo_bytes=MAX_PHOTO_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
