@@ -18,9 +18,8 @@ from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
 from app.common.errors import ConflictError, Problem
 from app.core.tuning.definition_checks import problems_of
-from app.db.base import added
+from app.db.base import JsonObject, added, utc_now
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
-from app.db.types import JsonObject, utc_now
 from app.fleet import service as fleet
 from app.fleet.registration import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice

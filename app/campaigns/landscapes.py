@@ -20,8 +20,8 @@ from app.common.errors import GainlineError
 from app.common.states import JobState
 from app.core.formatting import percent
 from app.core.tuning.landscape import Landscape, LandscapeGrid, LandscapePlan, free_gains, plan_grid
+from app.db.base import JsonObject
 from app.db.models import CampaignRow, JobRow, ProposalRow
-from app.db.types import JsonObject
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
 from app.figures.theme import ThemeName
