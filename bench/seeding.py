@@ -24,11 +24,11 @@ from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Explanation, Interval, band_channels
 from app.db import trajectories
+from app.db.base import JsonObject
 from app.db.migrate import migrate
 from app.db.models import CampaignRow, JobRow, ProposalRow, TrialRow
 from app.db.session import Database
 from app.db.trajectories import pack
-from app.db.types import JsonObject
 
 SAMPLES: Final = 16_700
 SEED: Final = 20261122

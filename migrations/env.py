@@ -6,9 +6,8 @@ from alembic import context
 from sqlalchemy import Connection, Enum
 
 from app.common.settings import Settings
-from app.db.base import Base
+from app.db.base import Base, FlightEndJson, UtcDateTime
 from app.db.session import open_engine
-from app.db.types import FlightEndJson, UtcDateTime
 
 
 def run_migrations(connection: Connection) -> None:

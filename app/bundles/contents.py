@@ -23,7 +23,7 @@ from app.core.tuning.proposals import Advice
 from app.core.tuning.stop_rules import StopVerdict
 from app.core.tuning.strategy import Explanation, Interval
 from app.core.tuning.strategy import Kind as ProposalKind
-from app.db.types import JsonObject
+from app.db.base import JsonObject
 
 FORMAT: Final = "gainline-campaign"
 MANIFEST: Final = "manifest.json"

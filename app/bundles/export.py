@@ -32,9 +32,9 @@ from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
 from app.campaigns.trials.records import telemetry_log_of
 from app.common.errors import BusyError, ConflictError, StorageError
+from app.db.base import utc_now
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.trajectories import is_intact, refused_for
-from app.db.types import utc_now
 from app.fleet.registration import origin_of
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)

@@ -18,9 +18,8 @@ from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
 from app.common.errors import ConflictError, Problem
 from app.core.tuning.definition_checks import problems_of
-from app.db.base import added
+from app.db.base import JsonObject, added, utc_now
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
-from app.db.types import JsonObject, utc_now
 from app.fleet import service as fleet
 from app.fleet.registration import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice
@@ -91,7 +90,6 @@ def _trials(
     """Store trials in large batches, because other writers wait meanwhile, but limited by memory."""
     made: list[TrialRow] = []
     waiting: list[TrajectoryRow | TrialPhotoRow] = []
-    size = 0
     for each in sources:
         row = TrialRow(
             campaign_id=campaign.id,
@@ -107,12 +105,9 @@ def _trials(
         ]
         session.add_all((row, *photos))
         made.append(row)
-        held: list[TrajectoryRow | TrialPhotoRow] = [*photos, *filter(None, (row.trajectory, row.predicted))]
-        waiting += held
-        size += sum(len(one.data) for one in held)
-        if size > _AT_ONCE_BYTES:
+        waiting += [*photos, *filter(None, (row.trajectory, row.predicted))]
+        if sum(len(one.data) for one in waiting) > _AT_ONCE_BYTES:
             _settle(session, waiting)
-            size = 0
     _settle(session, waiting)
     return made
 

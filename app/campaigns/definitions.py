@@ -22,8 +22,8 @@ from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
 from app.core.tuning.definition_checks import highest_set_point_m, problems_of
 from app.core.tuning.evidence import Evidence
+from app.db.base import JsonObject
 from app.db.models import CampaignRow, TrialRow
-from app.db.types import JsonObject
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue
 from app.vehicles.registry import VEHICLE_KINDS, check_options

@@ -35,9 +35,9 @@ from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Interval
 from app.db import trajectories
+from app.db.base import JsonObject, OptionsJson, utc_now
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
-from app.db.types import JsonObject, OptionsJson, utc_now
 from app.vehicles.flight_end import FlightEnd, not_begun
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")

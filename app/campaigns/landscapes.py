@@ -22,8 +22,8 @@ from app.common.states import JobState
 from app.core.formatting import percent
 from app.core.policy import Gains
 from app.core.tuning.landscape import Landscape, LandscapeGrid, free_gains, plan_grid
+from app.db.base import JsonObject
 from app.db.models import CampaignRow, JobRow, ProposalRow
-from app.db.types import JsonObject
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure
 from app.figures.theme import ThemeName

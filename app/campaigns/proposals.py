@@ -26,9 +26,8 @@ from app.core.policy import Gains
 from app.core.tuning.gate import GateResult
 from app.core.tuning.stop_rules import Reason, StopVerdict
 from app.db import trajectories
-from app.db.base import added
+from app.db.base import JsonObject, added, utc_now
 from app.db.models import CampaignRow, ProposalRow, TrialRow
-from app.db.types import JsonObject, utc_now
 from app.jobs import service as jobs
 
 PROPOSAL_JOB: Final = "proposal"

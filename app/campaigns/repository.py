@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session, defer, joinedload
 from app.campaigns.schemas import Sort
 from app.common.errors import NotFoundError
 from app.common.states import CampaignState, TrialState
+from app.db.base import OptionsJson
 from app.db.models import (
     CampaignRow,
     FlightRow,
@@ -20,7 +21,6 @@ from app.db.models import (
     VehicleRow,
 )
 from app.db.pages import Order
-from app.db.types import OptionsJson
 
 BEST_ERROR: Final = (
     select(func.min(TrialRow.error))

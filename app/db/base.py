@@ -1,14 +1,15 @@
-"""What the tables have in common: naming, types, states, ids, and the publication of changes."""
+"""What the tables have in common: naming, states, ids, types that SQLite lacks, the time, the report of changes."""
 
 import enum
 from collections.abc import Iterable
-from datetime import datetime
+from dataclasses import asdict
+from datetime import UTC, datetime
 from typing import Any, ClassVar, Final, Literal, TypeVar
 
-from sqlalchemy import JSON, CheckConstraint, Enum, MetaData
+from pydantic import TypeAdapter
+from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, Enum, MetaData, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
-from app.db.types import FlightEndJson, GainsJson, JsonObject, OptionsJson, UtcDateTime
 from app.vehicles.flight_end import FlightEnd
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
@@ -20,6 +21,47 @@ NAMING: Final = {
     "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
     "pk": "pk_%(table_name)s",
 }
+
+JsonObject = dict[str, Any]
+GainsJson = dict[str, float]
+OptionsJson = dict[str, bool | int | float | str]
+
+FLIGHT_END: Final = TypeAdapter(FlightEnd)
+"""Reads what `asdict` made of the end of a flight."""
+
+
+def utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+class FlightEndJson(TypeDecorator[FlightEnd]):
+    """How a flight ended, stored as JSON."""
+
+    impl = JSON(none_as_null=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: FlightEnd | None, _dialect: Dialect) -> dict[str, Any] | None:
+        return None if value is None else asdict(value)
+
+    def process_result_value(self, value: dict[str, Any] | None, _dialect: Dialect) -> FlightEnd | None:
+        return None if value is None else FLIGHT_END.validate_python(value)
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """An instant: timezone-aware in Python, stored as UTC. A naive time is refused because it is ambiguous."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, _dialect: Dialect) -> datetime | None:
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError("a time without a zone cannot be stored")
+        return value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, _dialect: Dialect) -> datetime | None:
+        return None if value is None else value.replace(tzinfo=UTC)
 
 
 _JSON: Final = JSON(none_as_null=True)

@@ -22,8 +22,19 @@ from app.common.states import (
     VehicleState,
 )
 from app.core.tuning.strategy import Kind as ProposalKind
-from app.db.base import NEVER_REUSE_IDS, Base, Numbered, Reported, Topic, is_one_of, state_check
-from app.db.types import GainsJson, JsonObject, OptionsJson, utc_now
+from app.db.base import (
+    NEVER_REUSE_IDS,
+    Base,
+    GainsJson,
+    JsonObject,
+    Numbered,
+    OptionsJson,
+    Reported,
+    Topic,
+    is_one_of,
+    state_check,
+    utc_now,
+)
 from app.vehicles.flight_end import FlightEnd
 
 

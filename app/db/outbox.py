@@ -15,9 +15,8 @@ from urllib.parse import quote
 from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session, UOWTransaction
 
-from app.db.base import Reported
+from app.db.base import Reported, utc_now
 from app.db.models import EventRow
-from app.db.types import utc_now
 
 KEPT_EVENTS: Final = 10_000
 """A browser that missed more changes than this loads everything again."""

@@ -15,8 +15,7 @@ from sqlalchemy.orm import Session
 
 from app.common.errors import InputError, Problem
 from app.common.schemas import Number, Page
-from app.db.base import Reported
-from app.db.types import UtcDateTime
+from app.db.base import Reported, UtcDateTime
 
 R = TypeVar("R", bound=Reported)
 V = TypeVar("V")

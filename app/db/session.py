@@ -21,8 +21,8 @@ from sqlalchemy.orm import Session, sessionmaker
 from app.common.errors import KeyReusedError, Problem, StorageError
 from app.core.clock import Clock
 from app.db import outbox
+from app.db.base import utc_now
 from app.db.models import IdempotencyRow
-from app.db.types import utc_now
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)

@@ -20,9 +20,8 @@ from app.accounts.permissions import Permission, RequestContext
 from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
-from app.db.base import added
+from app.db.base import JsonObject, added, utc_now
 from app.db.models import VehicleActRow, VehicleRow
-from app.db.types import JsonObject, utc_now
 from app.fleet import repository
 from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import Vehicle, VehicleAct

@@ -15,9 +15,8 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import STAGED_BY_SCRIPT, Permission, RequestContext, is_allowed, require
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import ActKind, ActState
-from app.db.base import added
+from app.db.base import JsonObject, added, utc_now
 from app.db.models import VehicleActRow, VehicleRow
-from app.db.types import JsonObject, utc_now
 from app.fleet import repository
 from app.fleet.schemas import Control, Lease, LeaseRequest
 

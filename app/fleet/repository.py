@@ -17,8 +17,8 @@ from app.common.states import (
     ActState,
     VehicleState,
 )
+from app.db.base import UtcDateTime
 from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleActRow, VehicleRow
-from app.db.types import UtcDateTime
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 Line = tuple[str, int]

@@ -17,10 +17,9 @@ from app.common.errors import BusyError, ConflictError, InputError, Problem
 from app.common.schemas import OptionValue, Page
 from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, VehicleState
 from app.core.policy import Gains
-from app.db.base import added
+from app.db.base import added, utc_now
 from app.db.models import CampaignRow, VehicleRow
 from app.db.pages import Order, page_of
-from app.db.types import utc_now
 from app.figures.vehicle_wear import BatteryFlight
 from app.fleet import repository
 from app.fleet.control import control_of

@@ -24,9 +24,8 @@ from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import FlightMode, FlightState, TrialState, VehicleState
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
-from app.db.base import added
+from app.db.base import added, utc_now
 from app.db.models import FlightRow
-from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord, find_mismatch

@@ -17,8 +17,8 @@ import numpy as np
 
 from app.common.errors import StorageError
 from app.core.records.trajectory import Trajectory
+from app.db.base import FLIGHT_END
 from app.db.earlier_ends import landing_of, read_end
-from app.db.types import FLIGHT_END
 from app.vehicles.base import FlightRecord
 
 RESERVED_BYTES: Final = 4 * 2**20

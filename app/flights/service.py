@@ -23,8 +23,8 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
+from app.db.base import utc_now
 from app.db.models import FlightRow, TrialRow, VehicleRow
-from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import (
     control_of,

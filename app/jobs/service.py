@@ -20,10 +20,9 @@ from app.common.errors import GainlineError, NotFoundError
 from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
-from app.db.base import added
+from app.db.base import JsonObject, added, utc_now
 from app.db.models import CampaignRow, JobRow
 from app.db.pages import Order, page_of
-from app.db.types import JsonObject, utc_now
 
 
 class Job(Schema):

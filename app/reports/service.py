@@ -29,9 +29,9 @@ from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, 
 from app.core.policy import Gain
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
+from app.db.base import utc_now
 from app.db.models import TrialPhotoRow
 from app.db.trajectories import damaged_trials
-from app.db.types import utc_now
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.fleet import service as fleet

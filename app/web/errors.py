@@ -222,8 +222,8 @@ def reason_of(found: Mapping[str, Any], schema: object = None) -> str:
     if kind == "string_too_short" and limits["min_length"] == 1:
         return "must not be empty"
     if kind not in _REASONS:
-        said: str = found["msg"]
-        return said[:1].lower() + said[1:]
+        message: str = found["msg"]
+        return message[:1].lower() + message[1:]
     written = {name: f"{limit:g}" if isinstance(limit, float) else limit for name, limit in limits.items()}
     reason = _REASONS[kind].format_map(written)
     text = str(value).lower() if isinstance(value, bool) else repr(value)  # as JSON has it

@@ -9,9 +9,9 @@ from fastapi import APIRouter, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app import __version__
+from app.db.base import utc_now
 from app.db.outbox import holds_everything_after, latest_event_before, latest_event_id
 from app.db.session import Database
-from app.db.types import utc_now
 from app.live.hub import Change, LinkState, LiveItem, changes_after
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.web.dependencies import CurrentDatabase, Live

@@ -139,11 +139,12 @@ class Access(Schema):
 def get_access(request: Request) -> Access:
     """What this client may do."""
     caller = caller_of(request)
-    elsewhere, may_command = caller.place is RequestOrigin.ELSEWHERE, is_allowed(Permission.TAKE_OFF, caller)
+    may_change, may_command = is_allowed(Permission.CHANGE, caller), is_allowed(Permission.TAKE_OFF, caller)
+    elsewhere = caller.place is RequestOrigin.ELSEWHERE
     link_helps = caller.key < Key.REMOTE if elsewhere else not caller.exposed
     return Access(
         elsewhere=elsewhere,
-        may_change=is_allowed(Permission.CHANGE, caller),
+        may_change=may_change,
         may_link=is_allowed(Permission.LINK, caller),
         may_command=may_command,
         hint=UNLOCK_HINT if link_helps and not may_command else "",

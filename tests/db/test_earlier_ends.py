@@ -9,9 +9,9 @@ import pytest
 from alembic import command
 from alembic.config import Config
 
+from app.db.base import FLIGHT_END
 from app.db.earlier_ends import give_end, read_end
 from app.db.session import open_engine
-from app.db.types import FLIGHT_END
 from app.vehicles.flight_end import end_text
 
 LINK = (

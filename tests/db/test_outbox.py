@@ -7,9 +7,9 @@ from fastapi.testclient import TestClient
 
 from app.common.states import JobState
 from app.db import outbox
+from app.db.base import utc_now
 from app.db.models import EventRow, JobRow
 from app.db.session import Database
-from app.db.types import utc_now
 from app.jobs import service as jobs
 from tests.builders import create_campaign, create_flown_trial, create_ready_campaign
 

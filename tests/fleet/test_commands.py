@@ -10,9 +10,9 @@ from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
 from app.common.states import ActKind, VehicleState
+from app.db.base import utc_now
 from app.db.models import TrialRow, VehicleActRow, VehicleRow
 from app.db.session import Database
-from app.db.types import utc_now
 from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot

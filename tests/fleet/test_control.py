@@ -4,10 +4,10 @@ from datetime import timedelta
 
 from fastapi.testclient import TestClient
 
+from app.db.base import utc_now
 from app.db.models import VehicleRow
 from app.db.outbox import latest_event_id
 from app.db.session import Database
-from app.db.types import utc_now
 from app.fleet.control import LEASE
 from tests.builders import Json, create_trial, get
 from tests.fleet.vehicles import (

@@ -7,8 +7,8 @@ from fastapi.testclient import TestClient
 
 from app.common.errors import ConflictError
 from app.core.definition import flight_seed
+from app.db.base import FLIGHT_END
 from app.db.session import Database
-from app.db.types import FLIGHT_END
 from app.flights import flight_rows
 from app.flights.flight_rows import FlightOutcome
 from app.vehicles.base import FlightRecord

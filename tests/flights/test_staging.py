@@ -13,9 +13,9 @@ from app.common.data_folder import telemetry_log
 from app.common.errors import ConflictError
 from app.common.settings import Settings
 from app.core.records.trajectory import Trajectory
+from app.db.base import FLIGHT_END, utc_now
 from app.db.models import FlightRow
 from app.db.session import Database
-from app.db.types import FLIGHT_END, utc_now
 from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.flight_commands import record_abort

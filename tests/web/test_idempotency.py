@@ -6,9 +6,9 @@ from datetime import timedelta
 import pytest
 from fastapi.testclient import TestClient
 
+from app.db.base import utc_now
 from app.db.models import CampaignRow, IdempotencyRow, TrialRow
 from app.db.session import KEPT_ANSWERS, Database
-from app.db.types import utc_now
 from tests.builders import (
     create_campaign,
     create_ready_campaign,

@@ -3,6 +3,7 @@
 A record is scored as it is stored, in single precision.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,8 +21,8 @@ from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.campaigns.trials.schemas import Trial, TrialPlan
-from app.campaigns.trials.service import Predict, create_trial, require_open, settle_gains
-from app.campaigns.trials.views import trajectory_view, trial_view
+from app.campaigns.trials.service import Predict, create_trial, gated_gains, require_open
+from app.campaigns.trials.views import trial_view, units_of
 from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
@@ -36,14 +37,14 @@ from app.common.states import (
 )
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
-from app.core.formatting import count
+from app.core.formatting import EXACT_DIGITS, count, format_gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import landing_battery_v
 from app.db import trajectories
+from app.db.base import utc_now
 from app.db.models import TrialRow
-from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.processes.calls import FILE, run_limited
@@ -155,6 +156,55 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
+_SINGLE_PRECISION: Final = 1e-6
+"""Logs store gains as single-precision numbers."""
+
+
+def _settle_gains(session: Session, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
+    """Set the trial's gains to those in the log; a CSV file, which contains none, leaves them as planned.
+
+    Where the values differ and that is `confirmed`, the trial takes the gains that were flown and loses the prediction
+    for the planned ones. Raises InputError for a log with other gains than those of the experiment or without their
+    values, UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
+    """
+    if flown.gain_names and row.gains.keys() != set(flown.gain_names):
+        raise InputError(
+            f"The log has the gains {', '.join(flown.gain_names)}; this campaign tunes {', '.join(row.gains)}.",
+            hint="Upload it to a campaign whose experiment has these gains.",
+            problems=(Problem("file", "is a log of another autopilot"),),
+        )
+    if not flown.gain_names:
+        return
+    if not flown.gains:
+        raise InputError(
+            "The log does not say with which gains it was flown.",
+            hint="Choose a log with the vehicle's parameters: for Paparazzi's .data file add the .log file of the same "
+            "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file; it "
+            "is then taken as flown with the planned gains.",
+            problems=(Problem("file", f"does not contain values of {', '.join(row.gains)}"),),
+        )
+    if all(
+        math.isclose(value, flown.gains[name], rel_tol=_SINGLE_PRECISION, abs_tol=_SINGLE_PRECISION)
+        for name, value in row.gains.items()
+    ):
+        row.read_back = row.read_back or dict(row.gains)
+        return
+    if not confirmed:
+        held = format_gains(flown.gains, EXACT_DIGITS)
+        raise UnconfirmedError(
+            f"The log was flown with {held}, not with the planned {format_gains(row.gains, EXACT_DIGITS)}.",
+            hint="Choose the log of this flight, or confirm that the trial takes the gains in the log.",
+            problems=(Problem("confirm", f"the log was flown with {held}"),),
+        )
+    row.read_back = dict(flown.gains)
+    row.gains, gate = gated_gains(session, row.campaign, flown.gains)
+    row.gate, row.kind = proposals.gate_json(gate), "manual"
+    row.predicted_error = row.predicted_interval = None
+    if (curve := row.predicted) is not None:
+        row.predicted = None
+        session.delete(curve)
+
+
 def _capture_import(session: Session, row: TrialRow, flown: Takeoff, *, invalid: bool) -> None:
     """Capture the record, as an invalid one if it begins at lift-off. Unless `invalid`, raises UnconfirmedError for a
     record that nobody's judgement can make valid, such as one that ends too early."""
@@ -190,7 +240,7 @@ def import_record(
     check_action(TRIAL_ACTIONS, "upload", row.state, f"Flight {row.number}")
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
-        settle_gains(session, row, flown, confirmed=confirmed)
+        _settle_gains(session, row, flown, confirmed=confirmed)
         _capture_import(session, row, flown, invalid=invalid)
         proposals.history_changed(session, campaign)
         return trial_view(session, row)
@@ -200,7 +250,7 @@ def import_record(
             hint="Fly it, or choose a campaign whose vehicle is “Flown elsewhere”.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
-    settle_gains(session, row, flown, confirmed=confirmed)
+    _settle_gains(session, row, flown, confirmed=confirmed)
     proposals.start_flying(campaign)
     row.flown_at = utc_now()
     _capture_import(session, row, flown, invalid=invalid)
@@ -260,9 +310,21 @@ def import_into_campaign(
 
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
-    """Thinned record of a trial. Raises NotFoundError when there is none, StorageError when it is damaged."""
+    """Record of a trial, thinned to at most `points` samples such that the scored output keeps its peaks.
+
+    Raises NotFoundError when there is none, StorageError when it is damaged.
+    """
     row = history.trial_row(session, trial_id)
-    return trajectory_view(row, history.record_of(session, row), points)
+    record = history.record_of(session, row)
+    leading = record.channels.get(experiment_of_campaign(row.campaign).output, record.time_s)
+    chosen = select_samples(record.time_s, leading, points)
+    return TrajectoryOut.view_of(
+        row.trajectory,
+        trial_id=row.id,
+        units=units_of(record.channels),
+        time_s=record.time_s[chosen].tolist(),
+        channels={name: values[chosen].tolist() for name, values in record.channels.items()},
+    )
 
 
 def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:

@@ -4,7 +4,6 @@ Every gain set passes the gate before it becomes a trial; an operator may overru
 predicted for a trial is kept with it, also for gains that no proposal contains.
 """
 
-import math
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -15,7 +14,6 @@ from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.autopilots.registry import evidence_of
-from app.autopilots.takeoffs import Takeoff
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
@@ -25,21 +23,19 @@ from app.campaigns.schemas import Campaign, Variant
 from app.campaigns.trials.schemas import Reopening, Trial, TrialEdit, TrialPlan
 from app.campaigns.trials.views import trial_view, trial_views
 from app.common.conflict_checks import check_action, check_version
-from app.common.errors import ConflictError, GainlineError, InputError, Problem, UnconfirmedError
+from app.common.errors import ConflictError, GainlineError, InputError, Problem
 from app.common.schemas import Gate, Page
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.errors import TrajectoryError
-from app.core.formatting import EXACT_DIGITS, format_gains
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategy import Proposal
-from app.db.base import added
+from app.db.base import JsonObject, added
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.db.pages import Order, page_of
 from app.db.trajectories import pack
-from app.db.types import JsonObject
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.vehicles.flight_end import not_begun
@@ -265,52 +261,3 @@ def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: Propo
         return proposal.kind
     flown = history.in_history(history.trials_of(session, campaign.id))
     return "repeat" if any(row.gains == gains for row in flown) else "manual"
-
-
-_SINGLE_PRECISION: Final = 1e-6
-"""Logs store gains as single-precision numbers."""
-
-
-def settle_gains(session: Session, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
-    """Set the trial's gains to those in the log; a CSV file, which contains none, leaves them as planned.
-
-    Where the values differ and that is `confirmed`, the trial takes the gains that were flown and loses the prediction
-    for the planned ones. Raises InputError for a log with other gains than those of the experiment or without their
-    values, UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
-    """
-    if flown.gain_names and row.gains.keys() != set(flown.gain_names):
-        raise InputError(
-            f"The log has the gains {', '.join(flown.gain_names)}; this campaign tunes {', '.join(row.gains)}.",
-            hint="Upload it to a campaign whose experiment has these gains.",
-            problems=(Problem("file", "is a log of another autopilot"),),
-        )
-    if not flown.gain_names:
-        return
-    if not flown.gains:
-        raise InputError(
-            "The log does not say with which gains it was flown.",
-            hint="Choose a log with the vehicle's parameters: for Paparazzi's .data file add the .log file of the same "
-            "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file; it "
-            "is then taken as flown with the planned gains.",
-            problems=(Problem("file", f"does not contain values of {', '.join(row.gains)}"),),
-        )
-    if all(
-        math.isclose(value, flown.gains[name], rel_tol=_SINGLE_PRECISION, abs_tol=_SINGLE_PRECISION)
-        for name, value in row.gains.items()
-    ):
-        row.read_back = row.read_back or dict(row.gains)
-        return
-    if not confirmed:
-        held = format_gains(flown.gains, EXACT_DIGITS)
-        raise UnconfirmedError(
-            f"The log was flown with {held}, not with the planned {format_gains(row.gains, EXACT_DIGITS)}.",
-            hint="Choose the log of this flight, or confirm that the trial takes the gains in the log.",
-            problems=(Problem("confirm", f"the log was flown with {held}"),),
-        )
-    row.read_back = dict(flown.gains)
-    row.gains, gate = gated_gains(session, row.campaign, flown.gains)
-    row.gate, row.kind = proposals.gate_json(gate), "manual"
-    row.predicted_error = row.predicted_interval = None
-    if (curve := row.predicted) is not None:
-        row.predicted = None
-        session.delete(curve)

@@ -14,7 +14,6 @@ from app.campaigns import history
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
-from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.common.conflict_checks import allowed
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
@@ -22,7 +21,7 @@ from app.core.experiments.base import Scatter
 from app.core.formatting import named_flights, percent, short
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
-from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
+from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
 from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
@@ -98,24 +97,6 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     return [_view(row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
-def trajectory_view(row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
-    """View of a record, thinned to at most `points` samples such that the scored output keeps its peaks."""
-    assert row.trajectory is not None
-    output = get_experiment(row.campaign.experiment).output
-    leading = trajectory.channels.get(output, trajectory.time_s)
-    chosen = select_samples(trajectory.time_s, leading, points)
-    return TrajectoryOut(
-        trial_id=row.id,
-        source=trajectory.source,
-        clock=trajectory.clock,
-        checksum=row.trajectory.checksum,
-        samples=len(trajectory),
-        units=_units(trajectory.channels),
-        time_s=trajectory.time_s[chosen].tolist(),
-        channels={name: values[chosen].tolist() for name, values in trajectory.channels.items()},
-    )
-
-
 def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
     predicted_error, interval = field.told_prediction(row)
     same = field.by_gains.get(_key(row.gains))
@@ -139,7 +120,7 @@ def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehe
             row.trajectory,
             ending=row.ending or "completed",
             channels=row.trajectory.columns[1:],
-            units=_units(row.trajectory.columns[1:]),
+            units=units_of(row.trajectory.columns[1:]),
         ),
         may_be_valid=_may_be_valid(row),
         flight=None
@@ -217,7 +198,8 @@ def _may_be_valid(row: TrialRow) -> bool:
     return row.curve[-1][0] >= float(experiment_of_campaign(row.campaign).grid_s[-1]) - MAX_GAP_S
 
 
-def _units(channels: Iterable[str]) -> dict[str, str]:
+def units_of(channels: Iterable[str]) -> dict[str, str]:
+    """The unit of each channel, empty where it has none."""
     return {name: CHANNEL_UNITS.get(name, "") for name in channels}
 
 

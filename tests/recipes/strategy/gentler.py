@@ -4,7 +4,8 @@ from typing import Final
 
 from app.core.experiments.base import ModelledExperiment
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias
-from app.core.tuning.strategy import Evidence, Explanation, Proposal, Strategy, proposal_of
+from app.core.tuning.evidence import Evidence
+from app.core.tuning.strategy import Explanation, Proposal, Strategy, proposal_of
 
 
 def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
