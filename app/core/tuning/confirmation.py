@@ -13,16 +13,17 @@ from typing import Final, Literal
 
 from app.core.experiments.base import Experiment
 from app.core.formatting import confidence_text, count, direction_of, format_gains, percent, plus_minus, short, times
-from app.core.statistics.comparisons import Comparison, smallest_difference
+from app.core.statistics.comparisons import (
+    SCATTER_NOT_KNOWN,
+    Comparison,
+    deciding_flights,
+    smallest_difference,
+    undecided,
+)
 from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import Proposal
 
 _NONE_BETTER: Final = MappingProxyType({0: "No other gains were flown.", 1: "The other gain set flown is not better."})
-
-SCATTER_NOT_KNOWN: Final = (
-    "The flight-to-flight scatter under this autopilot is unknown, so the difference cannot be tested. Fly one of "
-    "the gain sets again."
-)
 
 _NO_STEP: Final = "No further step is flown:"
 
@@ -156,14 +157,14 @@ def verdict_sentence(now: Evidence[Experiment]) -> str:
     if comparison is None:
         return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
     pair = f"{format_gains(now.winner.gains)} against the first flight's {format_gains(now.baseline.gains)}"
-    apart, direction = abs(comparison.difference), direction_of(comparison.difference)
-    if comparison.confidence is None or comparison.standard_error is None:
-        return f"Not known yet: {pair}, {short(apart)} {unit} {direction}. {SCATTER_NOT_KNOWN}"
-    found = f"{pair}, {plus_minus(apart, comparison.standard_error, unit)} {direction}"
-    sure = f"{confidence_text(comparison.confidence)} confidence"
-    if comparison.verdict == "unresolved":
-        return f"Unresolved: {found}, {sure}. {_deciding(comparison)}"
-    return f"{comparison.verdict.capitalize()} with {sure}: {found}."
+    apart, error = abs(comparison.difference), comparison.standard_error
+    amount = f"{short(apart)} {unit}" if error is None else plus_minus(apart, error, unit)
+    found = f"{pair}, {amount} {direction_of(comparison.difference)}"
+    if comparison.verdict in ("unresolved", "not known yet"):
+        return undecided(comparison, found, _deciding(comparison))
+    return (
+        f"{comparison.verdict.capitalize()} with {confidence_text(comparison.confidence or 0.0)} confidence: {found}."
+    )
 
 
 def _flown_again(now: Evidence[Experiment], verdict: str) -> Confirmation:
@@ -199,13 +200,3 @@ def _missing(comparison: Comparison) -> str:
 
 def _deciding(comparison: Comparison) -> str:
     return deciding_flights(comparison, "with the best gains", "with the first gains")
-
-
-def deciding_flights(comparison: Comparison, first: str, second: str, joint: str = ", ") -> str:
-    """The further flights that would decide an unresolved comparison, in a sentence; `first` and `second` say of whose
-    gains."""
-    further = comparison.further
-    if further is None:
-        return "Even 100 more flights would not resolve it."
-    shares = joint.join(f"{n} {whose}" for n, whose in ((further.first, first), (further.second, second)) if n)
-    return f"If the difference persists, {count(further.total, 'more flight')} would resolve it: {shares}."
