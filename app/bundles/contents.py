@@ -16,11 +16,12 @@ from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field, TypeAdapt
 from app.campaigns.schemas import Definition
 from app.common.schemas import Gate, Name, OptionValue, Schema
 from app.common.states import AbortCause, CampaignState, Ending, Outcome, TrialKind, TrialState
+from app.core.definition import Interval
 from app.core.experiments.base import ParameterDistribution
 from app.core.records.glitches import Glitch
 from app.core.tuning.proposals import Advice
 from app.core.tuning.stop_rules import StopVerdict
-from app.core.tuning.strategy import Explanation, Interval
+from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 from app.db.types import JsonObject
 from app.vehicles.flight_end import FlightEnd

@@ -14,11 +14,12 @@ from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
+from app.core.definition import Interval
 from app.core.experiments.base import Experiment
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.tuning.evidence import Evidence
-from app.core.tuning.strategy import Interval, band_channels
+from app.core.tuning.strategy import band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES

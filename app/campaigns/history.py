@@ -28,11 +28,10 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
-from app.core.definition import Definition, Donor, Flight, Prediction
+from app.core.definition import Definition, Donor, Flight, Interval, Prediction
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
-from app.core.tuning.strategy import Interval
 from app.db import trajectories
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
@@ -210,12 +209,8 @@ def told_prediction(
 ) -> tuple[float | None, Interval | None]:
     """The stored error and interval of a prediction; both None if they say nothing. `corrected`: whether a flight had
     corrected the model before."""
-    interval = (
-        None
-        if stored is None
-        else Interval(lower=stored["lower"], upper=stored["upper"], confidence=stored["confidence"])
-    )
-    if not is_informative(None if interval is None else interval.lower, corrected=corrected):
+    interval = None if stored is None else Interval(**stored)
+    if not is_informative(interval, corrected=corrected):
         return None, None
     return error, interval
 
@@ -245,7 +240,6 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
 
 def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
     outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
-    interval = row.predicted_interval or {}
     return Flight(
         number=row.number,
         gains=row.gains,
@@ -254,7 +248,10 @@ def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, floa
         outcome=outcome,
         predicted=None
         if row.predicted_error is None
-        else Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper")),
+        else Prediction(
+            error=row.predicted_error,
+            interval=None if row.predicted_interval is None else Interval(**row.predicted_interval),
+        ),
         against_gains=_is_against_gains(row),
         parameters=parameters,
     )

@@ -18,7 +18,7 @@ from app.core.analysis.loop import AltitudeLoop, GainSpace, LoggedFlight
 from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
-from app.core.definition import Flight, best_flight
+from app.core.definition import Flight, Interval, best_flight
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.experiments.base import (
     FittedParameter,
@@ -34,7 +34,7 @@ from app.core.policy import Box, Vector
 from app.core.tuning.calibration import fitted_flights
 from app.core.tuning.limited_model import LimitedModel
 from app.core.tuning.predictions import FlightPrediction, interval_reach
-from app.core.tuning.strategy import Interval, positive_interval, with_band
+from app.core.tuning.strategy import positive_interval, with_band
 
 _COMPARED: Final = "For comparison: "
 _DIGITS: Final = 3

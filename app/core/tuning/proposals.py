@@ -77,7 +77,7 @@ def _start(evidence: Evidence[ModelledExperiment]) -> Proposal:
     start = with_interval(evidence, start, base=None)
     outlook = (
         f"predicts {short(predicted.error)} {experiment.error_unit}"
-        if is_informative(None if start.interval is None else start.interval.lower, corrected=False)
+        if is_informative(start.interval, corrected=False)
         else "is too uncertain to predict its error"
     )
     summary = f"{_describe_start(evidence, gains)}; {source} {outlook}."

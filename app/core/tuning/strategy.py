@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Literal, Protocol
 
-from app.core.definition import Option
+from app.core.definition import Interval, Option
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
 from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -28,18 +28,6 @@ class LadderStep:
     gains: dict[str, float]
     predicted_error: float
     clipped: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Interval:
-    """Predicted interval of the error, with probability `confidence`."""
-
-    lower: float
-    upper: float
-    confidence: float = 0.9
-
-    def __contains__(self, error: float) -> bool:
-        return self.lower <= error <= self.upper
 
 
 def positive_interval(lower: float, upper: float) -> Interval:
