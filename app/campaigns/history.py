@@ -29,7 +29,7 @@ from app.common.states import (
     TrialState,
 )
 from app.core.definition import Definition, Donor, Flight, Interval, Prediction
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
 from app.db import trajectories
@@ -167,11 +167,11 @@ def _loop_parameters(
     session: Session, definition: Definition, rows: Sequence[TrialRow]
 ) -> Mapping[int, Mapping[str, float]]:
     """The parameters of each flight on which the model depends, by trial id."""
-    modelled = experiment_of(definition).modelled
-    if modelled is None:
+    experiment = experiment_of(definition)
+    if not isinstance(experiment, ModelledExperiment):
         return {}
     settings = repository.settings(session, [row.id for row in rows])
-    return {row_id: modelled.loop_parameters(_numbers(found)) for row_id, found in settings.items()}
+    return {row_id: experiment.loop_parameters(_numbers(found)) for row_id, found in settings.items()}
 
 
 def flight_under_way(session: Session, campaign_id: int | None = None) -> FlightRow | None:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Final, TypeGuard
+from typing import Final
 
 import numpy as np
 from sqlalchemy import select
@@ -354,10 +354,5 @@ def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> lis
 
 
 def _change(first: OptionValue | None, value: OptionValue | None) -> int | float | None:
-    if _is_number(first) and _is_number(value):
-        return value - first
-    return None
-
-
-def _is_number(value: OptionValue | None) -> TypeGuard[int | float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    numbers = [each for each in (first, value) if isinstance(each, int | float) and not isinstance(each, bool)]
+    return numbers[1] - numbers[0] if len(numbers) == 2 else None

@@ -137,7 +137,7 @@ class Strategy:
     def works_with(self, experiment: Experiment) -> bool:
         """Whether a campaign may combine this strategy with the experiment."""
         supported = not self.kinds or isinstance(experiment, self.kinds)
-        return supported and not (self.needs_model and experiment.modelled is None)
+        return supported and (isinstance(experiment, ModelledExperiment) or not self.needs_model)
 
 
 def band_channels(output: str) -> tuple[str, str]:
