@@ -17,12 +17,12 @@ from app.campaigns.schemas import NewCampaign
 from app.campaigns.trials.records import keep_response, score
 from app.common.settings import Settings
 from app.common.states import CampaignState, JobState, TrialState
-from app.core.definition import Definition
+from app.core.definition import Definition, Interval
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
-from app.core.tuning.strategy import Explanation, Interval, band_channels
+from app.core.tuning.strategy import Explanation, band_channels
 from app.db import trajectories
 from app.db.base import JsonObject
 from app.db.migrate import migrate

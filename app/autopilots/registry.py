@@ -14,7 +14,7 @@ from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.autopilots.px4.profile import PX4
 from app.core.definition import Definition, Flight, OptionValue
 from app.core.errors import InputError, Problem
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.policy import PolicySpace
 from app.core.tuning.evidence import Evidence
@@ -41,7 +41,7 @@ REPLACEMENTS: Final[Mapping[str, str]] = MappingProxyType(
         for experiments in _OTHERS
         for without_model in experiments
         for modelled in experiments
-        if without_model.modelled is None and modelled.modelled is not None
+        if not isinstance(without_model, ModelledExperiment) and isinstance(modelled, ModelledExperiment)
     }
 )
 """Experiments that are not offered for new campaigns, and what replaces each: without a model nothing proposes gains.
@@ -76,11 +76,11 @@ def experiment_of(definition: Definition) -> Experiment:
     """Return the experiment of a definition, configured as defined there; with the vehicle and the autopilot's
     parameters of the log that it starts from, if it does."""
     experiment = get_experiment(definition.experiment, definition.experiment_options)
-    log, modelled = definition.start.log, experiment.modelled
-    if log is None or modelled is None:
+    log = definition.start.log
+    if log is None or not isinstance(experiment, ModelledExperiment):
         return experiment
-    mean, deviation = np.array([log.vehicle[each.name] for each in modelled.model_parameters]).T
-    return modelled.informed(mean, deviation).under(log.parameters)
+    mean, deviation = np.array([log.vehicle[each.name] for each in experiment.model_parameters]).T
+    return experiment.informed(mean, deviation).under(log.parameters)
 
 
 def evidence_of(

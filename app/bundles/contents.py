@@ -17,11 +17,12 @@ from app.campaigns.schemas import Definition
 from app.campaigns.trials.schemas import TrialFacts
 from app.common.schemas import Gate, Name, OptionValue, Schema
 from app.common.states import CampaignState, Ending, Outcome, TrialState
+from app.core.definition import Interval
 from app.core.experiments.base import ParameterDistribution
 from app.core.records.glitches import Glitch
 from app.core.tuning.proposals import Advice
 from app.core.tuning.stop_rules import StopVerdict
-from app.core.tuning.strategy import Explanation, Interval
+from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 from app.db.base import JsonObject
 

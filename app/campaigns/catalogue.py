@@ -12,6 +12,7 @@ from app.autopilots.registry import AUTOPILOTS, EXPERIMENTS, offered
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue, Schema
+from app.core.experiments.base import ModelledExperiment
 from app.core.policy import Gain
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
@@ -142,7 +143,7 @@ def get_catalogue() -> Catalogue:
             ExperimentInfo.view_of(
                 each,
                 output_unit=CHANNEL_UNITS[each.output],
-                has_model=each.modelled is not None,
+                has_model=isinstance(each, ModelledExperiment),
                 gains=each.space.gains,
             )
             for each in EXPERIMENTS.values()

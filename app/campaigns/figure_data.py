@@ -14,11 +14,12 @@ from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
-from app.core.experiments.base import Experiment
+from app.core.definition import Interval
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.tuning.evidence import Evidence
-from app.core.tuning.strategy import Interval, band_channels
+from app.core.tuning.strategy import band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
@@ -207,10 +208,9 @@ def _goal(experiment: Experiment) -> tuple[Curve, Curve | None]:
     """Set point over the window, and the reference if the model has one; neither depends on the gains."""
     grid = experiment.grid_s
     set_point = Curve(grid, experiment.set_point(grid))
-    modelled = experiment.modelled
-    if modelled is None:
+    if not isinstance(experiment, ModelledExperiment):
         return set_point, None
-    model = modelled.simulate(modelled.space.default, modelled.nominal_model)
+    model = experiment.simulate(experiment.space.default, experiment.nominal_model)
     return set_point, Curve(model.time_s, model["reference_m"]) if "reference_m" in model.channels else None
 
 

@@ -159,8 +159,7 @@ def _checked(question: _Question, predicted: Proposal | None) -> Proposal | None
     """The prediction, or only its curve where error, interval and band say nothing; None where the model diverges."""
     if predicted is None or predicted.predicted_error is None or not math.isfinite(predicted.predicted_error):
         return None
-    lower = None if predicted.interval is None else predicted.interval.lower
-    if is_informative(lower, corrected=history.is_corrected(question.trials)):
+    if is_informative(predicted.interval, corrected=history.is_corrected(question.trials)):
         return predicted
     curve = None if predicted.predicted is None else _only(predicted.predicted, question.output)
     return replace(predicted, predicted=curve, predicted_error=None, interval=None)

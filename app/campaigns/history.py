@@ -29,11 +29,10 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
-from app.core.definition import Definition, Donor, Flight, Prediction
-from app.core.experiments.base import Experiment
+from app.core.definition import Definition, Donor, Flight, Interval, Prediction
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
-from app.core.tuning.strategy import Interval
 from app.db import trajectories
 from app.db.base import JsonObject, OptionsJson, utc_now
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
@@ -139,9 +138,7 @@ def history_digest(session: Session, campaign: CampaignRow, definition: Definiti
     """
     checksums = repository.checksums(session, campaign.id)
     rows = in_history(trials)
-    modelled = experiment_of(definition).modelled
-    settings = {} if modelled is None else repository.settings(session, [row.id for row in rows])
-    parameters = {row_id: modelled.loop_parameters(_numbers(found)) for row_id, found in settings.items() if modelled}
+    parameters = _loop_parameters(session, definition, rows)
     flights = [
         [
             row.number,
@@ -160,6 +157,17 @@ def history_digest(session: Session, campaign: CampaignRow, definition: Definiti
     reopened = [] if not campaign.open_until_flight else [["open until flight", campaign.open_until_flight]]
     content = json.dumps([definition.digest(), flights, *battery, *reopened], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _loop_parameters(
+    session: Session, definition: Definition, rows: Sequence[TrialRow]
+) -> Mapping[int, Mapping[str, float]]:
+    """The parameters of each flight on which the model depends, by trial id."""
+    experiment = experiment_of(definition)
+    if not isinstance(experiment, ModelledExperiment):
+        return {}
+    settings = repository.settings(session, [row.id for row in rows])
+    return {row_id: experiment.loop_parameters(_numbers(found)) for row_id, found in settings.items()}
 
 
 def flight_under_way(session: Session, campaign_id: int | None = None) -> FlightRow | None:
@@ -197,9 +205,10 @@ def told_prediction(
 ) -> tuple[float | None, Interval | None]:
     """The stored error and interval of a prediction; both None if they say nothing. `corrected`: whether a flight had
     corrected the model before."""
-    if not is_informative(None if stored is None else stored["lower"], corrected=corrected):
+    interval = None if stored is None else Interval(**stored)
+    if not is_informative(interval, corrected=corrected):
         return None, None
-    return error, None if stored is None else Interval(**stored)
+    return error, interval
 
 
 def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:
@@ -226,7 +235,6 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
 
 
 def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
-    interval = row.predicted_interval or {}
     return Flight(
         number=row.number,
         gains=row.gains,
@@ -235,7 +243,10 @@ def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, param
         outcome="valid" if row.state == TrialState.VALID else "aborted",
         predicted=None
         if row.predicted_error is None
-        else Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper")),
+        else Prediction(
+            error=row.predicted_error,
+            interval=None if row.predicted_interval is None else Interval(**row.predicted_interval),
+        ),
         against_gains=_is_against_gains(row),
         parameters=parameters,
     )

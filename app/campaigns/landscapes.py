@@ -19,6 +19,7 @@ from app.campaigns.figure_data import history_of
 from app.campaigns.proposals import is_stale, read_history
 from app.common.errors import GainlineError
 from app.common.states import JobState
+from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import percent
 from app.core.policy import Gains
 from app.core.tuning.landscape import Landscape, LandscapeGrid, free_gains, plan_grid
@@ -47,7 +48,7 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> Land
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     definition = definition_of(campaign)
-    if experiment_of(definition).modelled is None:
+    if not isinstance(experiment_of(definition), ModelledExperiment):
         return _waiting("There is no model of this vehicle's controller, so no landscape can be computed.")
     if free_gains(space_of(definition)) < 2:
         return _waiting("The campaign's bounds leave fewer than two gains free; a landscape needs two.")

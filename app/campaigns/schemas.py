@@ -21,6 +21,7 @@ from app.common.schemas import (
     Version,
 )
 from app.common.states import CampaignState, Outcome
+from app.core.definition import Interval
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.definition_checks import (
     MAX_CEILING_M,
@@ -32,7 +33,7 @@ from app.core.tuning.definition_checks import (
 )
 from app.core.tuning.proposals import Advice, AdviceKind
 from app.core.tuning.strategies import recommended_strategy
-from app.core.tuning.strategy import Explanation, Interval, Kind
+from app.core.tuning.strategy import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
 # The ranges of a definition are documented here and checked in app.core.tuning.definition_checks with everything else,

@@ -14,8 +14,8 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, signed
 from app.core.statistics.comparisons import Verdict, drift_of, optimism, trend_of
 from app.core.tuning import predictions
-from app.core.tuning.confirmation import verdict_sentence
 from app.core.tuning.evidence import Evidence
+from app.core.tuning.stop_rules import verdict_sentence
 from app.db.models import TrialRow, VehicleRow
 from app.fleet import service as fleet
 

@@ -9,7 +9,6 @@ import structlog
 
 from app.campaigns import computation, landscapes, proposals
 from app.common.errors import GainlineError
-from app.core.tuning.landscape import predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob
@@ -78,7 +77,7 @@ class LandscapeJob:
             if monotonic() - told_s >= PROGRESS_EVERY_S:
                 told_s = monotonic()
                 self._report(job, done / len(points), f"{done} of {len(points)} gain sets evaluated")
-            errors.append(self.pool.run(predict_points, survey.predict_errors, part))
+            errors.append(self.pool.run(survey.predict_errors, part))
             done += len(part)
         result = landscapes.as_json(survey.landscape(np.concatenate(errors)), job.order)
         with self.database.write() as session:

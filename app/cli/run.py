@@ -27,12 +27,11 @@ from app.cli.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
 from app.common.states import HISTORY_TRIAL_STATES, CampaignState, TrialState, VehicleState
-from app.core.definition import Definition
+from app.core.definition import Definition, Interval
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
-from app.core.tuning.strategy import Interval
 from app.db.migrate import migrate
 from app.db.models import ProposalRow, TrialRow
 from app.db.session import Database

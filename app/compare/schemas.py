@@ -1,7 +1,7 @@
 """API views of flight comparisons."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -9,8 +9,7 @@ from app.campaigns.trials.schemas import GroupBrief
 from app.common.schemas import Gains, OptionValue, Schema
 from app.common.states import TrialState
 from app.core.statistics.comparisons import Verdict
-
-Basis = Literal["gains", "repeats", "apart", "no error"]
+from app.core.statistics.pairs import Basis
 
 
 class FlightSetting(Schema):

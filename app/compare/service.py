@@ -1,44 +1,68 @@
-"""Comparison of flights: what differs between them, its effect on the error, and their curves.
+"""Comparison of flights: what differs between them, its effect on the error (`app.core.statistics.pairs`), and their
+curves."""
 
-Each flight counts with all valid flights of its gains in its campaign, and the scatter is that of its population, so
-flights of one campaign have the same verdict as in that campaign. Between populations there is no verdict, because
-vehicle and gains differ together; only the errors are reported.
-"""
-
-import math
-from collections.abc import Sequence
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
 import numpy as np
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.autopilots.registry import experiment_of
 from app.campaigns import history
+from app.campaigns import service as campaigns_service
+from app.campaigns.definitions import definition_of
 from app.campaigns.trials.schemas import GroupBrief
-from app.campaigns.trials.views import CONFIDENCE
-from app.compare.compared_flights import (
-    ComparisonFlight,
-    capitalised,
-    file_stem,
-    gain_differences,
-    named,
-    setting_differences,
-    settings_of,
-    sides_of,
-    vehicle_name,
+from app.common.errors import InputError, Problem
+from app.common.schemas import OptionValue
+from app.compare.schemas import (
+    ComparedFlight,
+    FlightComparison,
+    FlightDifference,
+    FlightPair,
+    FlightSetting,
+    FurtherFlights,
 )
-from app.compare.schemas import Basis, ComparedFlight, FlightComparison, FlightPair, FurtherFlights
-from app.core.formatting import confidence_text, direction_of, format_gains, measured
+from app.core.definition import Option, with_defaults
+from app.core.experiments.base import Experiment
 from app.core.records.trajectory import CHANNEL_UNITS, Samples
-from app.core.statistics.comparisons import Comparison, Group, Verdict, compare, drift_of
-from app.core.tuning.confirmation import SCATTER_NOT_KNOWN, deciding_flights
+from app.core.statistics.comparisons import groups_of, pool_scatter
+from app.core.statistics.pairs import (
+    LeadingPair,
+    Population,
+    Side,
+    compare_pair,
+    find_leading_pair,
+    list_notes,
+    overall_verdict,
+)
+from app.core.tuning.strategies import STRATEGIES
 from app.db import trajectories
+from app.db.models import CampaignRow, TrialRow
 from app.figures.base import Card, card_of
 from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure
 from app.figures.data import Curve
 from app.figures.theme import ThemeName
 from app.fleet import service as fleet
+from app.vehicles.registry import VEHICLE_KINDS
+
+LABELS: Final = "ABCDEFGHIJKLMNOPQRST"
+MAX_FLIGHTS: Final = len(LABELS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonFlight(Side):
+    """One flight of a comparison; `label` is its letter in the figure."""
+
+    row: TrialRow
+    campaign: CampaignRow
+    experiment: Experiment
+    label: str
+
 
 GRID_STEP_S: Final = 0.02
 
@@ -77,9 +101,15 @@ def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightCompari
         ],
         gains=gain_differences(sides),
         settings=setting_differences(settings),
-        pairs=compare_pairs(sides, leading),
+        pairs=[_pair(later, earlier, leading) for earlier, later in combinations(sides, 2)],
         file_stem=file_stem([side.row for side in sides]),
     )
+
+
+def _pair(side: ComparisonFlight, against: ComparisonFlight, leading: LeadingPair | None) -> FlightPair:
+    found = compare_pair(side, against, leading)
+    further = found.further and FurtherFlights(trial=found.further.first, against=found.further.second)
+    return FlightPair.view_of(found, trial_id=side.row.id, against_id=against.row.id, further=further)
 
 
 def comparison_figure(session: Session, trial_ids: Sequence[int], theme: ThemeName) -> Card:
@@ -139,207 +169,190 @@ def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonDat
     )
 
 
-def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidates: int = 1) -> FlightPair:
-    """Compare `side` with `against`; `side` was chosen among that many `candidates` for its low error."""
-    if side.group is None or against.group is None:
-        missing = side if side.group is None else against
-        sentence = f"{capitalised(missing.name)} is {missing.row.state}: it has no error that counts."
-        return _pair(side, against, "no error", sentence)
-    if side.population != against.population:
-        return _apart(side, side.group, against, against.group)
-    if side.group is against.group:
-        return _repeats(side, against, side.group)
-    comparison = compare(side.group, against.group, side.scatter, CONFIDENCE, candidates=candidates)
-    same = dict(side.group.gains) == dict(against.group.gains)
-    sentence = (
-        _changed(side, against, comparison)
-        if same
-        else _comparison_sentence(side, side.group, against, against.group, comparison)
-    )
-    further = comparison.further
-    return _pair(
-        side,
-        against,
-        "repeats" if same else "gains",
-        sentence,
-        verdict=comparison.verdict,
-        confidence=comparison.confidence,
-        difference=comparison.difference,
-        standard_error=comparison.standard_error,
-        further=None if further is None else FurtherFlights(trial=further.first, against=further.second),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class LeadingPair:
-    """The flight with the lowest mean plus its standard error among the `policies` that were flown, and the one that it
-    is compared with: the first flight, or the next lowest if it has the first flight's gains."""
-
-    best: ComparisonFlight
-    other: ComparisonFlight
-    policies: int
-
-    @property
-    def candidates(self) -> int:
-        return max(1, self.policies - 1)
-
-    def is_of(self, side: ComparisonFlight, against: ComparisonFlight) -> bool:
-        """Whether the two flights have the gains of this pair."""
-        return {id(side.group), id(against.group)} == {id(self.best.group), id(self.other.group)}
-
-
-def find_leading_pair(sides: Sequence[ComparisonFlight]) -> LeadingPair | None:
-    """None if fewer than two flights have an error that counts."""
-    ranked = sorted((side for side in sides if side.group is not None), key=_rank)
-    if len(ranked) < 2:
-        return None
-    best, first = ranked[0], sides[0]
-    other = (
-        first
-        if first.group not in (None, best.group)
-        else next((side for side in ranked if side.group is not best.group), ranked[1])
-    )
-    return LeadingPair(best, other, policies=len({id(side.group) for side in ranked}))
-
-
-def overall_verdict(leading: LeadingPair | None) -> tuple[Verdict | None, str]:
-    """Compare the best gains with the first flight's, as in a campaign."""
-    if leading is None:
-        return None, "No verdict: fewer than two of these flights have an error that counts."
-    pair = compare_pair(leading.best, leading.other, candidates=leading.candidates)
-    among = (
-        f"{capitalised(leading.best.name)} is the lowest of {leading.policies} gain sets, and the confidence allows "
-        "for this choice. "
-    )
-    return pair.verdict, f"{among if leading.policies > 2 else ''}{pair.sentence}"
-
-
-def compare_pairs(sides: Sequence[ComparisonFlight], leading: LeadingPair | None) -> list[FlightPair]:
-    """Compare each flight with every earlier one of the list; the gains of the leading pair have the confidence of the
-    overall verdict, which allows for their choice."""
+def names_of(rows: Sequence[TrialRow], campaigns: Mapping[int, CampaignRow]) -> list[str]:
+    """`flight 3`; with the campaign's name if there are several, and with its id if two have the same name."""
+    used = {row.campaign_id: campaigns[row.campaign_id].name for row in rows}
+    if len(used) == 1:
+        return [f"flight {row.number}" for row in rows]
+    alike = Counter(used.values())
     return [
-        compare_pair(
-            later,
-            earlier,
-            candidates=leading.candidates if leading is not None and leading.is_of(later, earlier) else 1,
-        )
-        for earlier, later in combinations(sides, 2)
+        f"flight {row.number} of {(name := used[row.campaign_id])}"
+        + (f" (campaign {row.campaign_id})" if alike[name] > 1 else "")
+        for row in rows
     ]
 
 
-def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
-    """Caveats that apply to the numbers."""
-    first = sides[0]
-    apart = dict.fromkeys(_why_apart(side, first)[1] for side in sides if side.population != first.population)
-    campaigns: dict[str, set[int]] = {}
-    for side in sides:
-        campaigns.setdefault(side.population, set()).add(side.campaign.id)
-    scatters = {side.population: side.scatter for side in sides}
-    shared = [
-        f"Scatter of one flight: {scatters[population].sigma:.4f} {first.experiment.error_unit}, pooled over repeats "
-        f"in {len(members)} campaigns of the same vehicle and experiment."
-        for population, members in campaigns.items()
-        if len(members) > 1 and scatters[population].known
+def file_stem(rows: Sequence[TrialRow]) -> str:
+    """`compare-campaign-3-flights-1-4-campaign-5-flight-2`; only the number of flights if that would be too long."""
+    numbers: dict[int, list[int]] = {}
+    for row in rows:
+        numbers.setdefault(row.campaign_id, []).append(row.number)
+    parts = [
+        f"campaign-{campaign_id}-flight{'s' if len(flown) > 1 else ''}-{'-'.join(map(str, flown))}"
+        for campaign_id, flown in numbers.items()
     ]
-    return [*apart, *shared]
+    stem = "-".join(["compare", *parts])
+    return stem if len(stem) <= 80 else f"compare-{len(rows)}-flights"
 
 
-def _rank(side: ComparisonFlight) -> tuple[float, str]:
-    assert side.group is not None
-    return side.group.mean + side.group.standard_error(side.scatter), side.label
+def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFlight]:
+    """Collect the flights in the given order.
 
-
-def _pair(
-    side: ComparisonFlight, against: ComparisonFlight, basis: Basis, sentence: str, **found: object
-) -> FlightPair:
-    """The pair with what was `found` of it; null for the other fields."""
-    known = {"trial_id": side.row.id, "against_id": against.row.id, "basis": basis, "sentence": sentence, **found}
-    return FlightPair.model_validate(dict.fromkeys(FlightPair.model_fields) | known)
-
-
-def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group) -> FlightPair:
-    """Compare two means with different scatters: the difference has the sum of both variances."""
-    difference = own.mean - other.mean
-    known = side.scatter.known and against.scatter.known
-    uncertainty = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
-    standard_error = uncertainty if known else None
-    amount = measured(abs(difference), standard_error, side.experiment.error_unit)
-    how, _ = _why_apart(side, against)
-    apart = f"{amount} {direction_of(difference)} than {against.name}"
-    sentence = f"No verdict on the gains: {side.name}, {how}, is {apart}."
-    return _pair(side, against, "apart", sentence, difference=difference, standard_error=standard_error)
-
-
-def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, str]:
-    """What differs between the two campaigns besides the gains: in short, and as a sentence with its consequence."""
-    one, other = side.campaign.vehicle, against.campaign.vehicle
-    if side.experiment.name != against.experiment.name:
-        how, what = (
-            "in another experiment",
-            f"Different experiments ({against.experiment.title}, {side.experiment.title})",
+    Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared.
+    """
+    found = {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
+    campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
+    experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
+    problems = [
+        Problem(f"trial.{index}", reason)
+        for index, trial_id in enumerate(trial_ids)
+        if (reason := _refusal(trial_ids, index, found.get(trial_id), found, experiments)) is not None
+    ]
+    if problems:
+        raise InputError(
+            "These flights cannot be compared.",
+            hint="Remove the flights listed, or choose others.",
+            problems=tuple(problems),
         )
-    elif one.id != other.id:
-        how, what = "flown by another vehicle", f"Different vehicles ({other.title}, {one.title})"
-    elif not fleet.can_fly(one):
-        how = "perhaps flown by another vehicle"
-        what = "Flights flown elsewhere: it is unknown whether the same vehicle flew both campaigns"
+    rows = [found[trial_id] for trial_id in trial_ids]
+    groups = {key: groups_of(history.flown_gains(history.trials_of(session, key))) for key in campaigns}
+    populations = {key: population_of(campaigns[key], experiments[key]) for key in campaigns}
+    return [
+        ComparisonFlight(
+            row=row,
+            campaign=campaigns[row.campaign_id],
+            experiment=experiment,
+            label=label,
+            number=row.number,
+            name=name,
+            state=row.state,
+            campaign_id=row.campaign_id,
+            error_unit=experiment.error_unit,
+            group=next((group for group in groups[row.campaign_id] if row.number in group.numbers), None),
+            scatter=pool_scatter(
+                [each for key, own in groups.items() if populations[key] == population for each in own],
+                experiment.scatter,
+            ),
+            population=population,
+        )
+        for row, label, name in zip(rows, LABELS, names_of(rows, campaigns), strict=False)
+        for experiment, population in [(experiments[row.campaign_id], populations[row.campaign_id])]
+    ]
+
+
+def population_of(campaign: CampaignRow, experiment: Experiment) -> Population:
+    vehicle, is_known = campaign.vehicle, fleet.can_fly(campaign.vehicle)
+    options = {} if vehicle.registered else campaign.vehicle_options
+    chosen = with_defaults(definition_of(campaign).experiment_options, experiment.options)
+    return Population(
+        vehicle.id,
+        vehicle.title,
+        experiment.title,
+        settings=json.dumps([options, chosen], sort_keys=True) if is_known else f"campaign {campaign.id}",
+        known=is_known,
+    )
+
+
+def _refusal(
+    trial_ids: Sequence[int],
+    index: int,
+    row: TrialRow | None,
+    found: Mapping[int, TrialRow],
+    experiments: Mapping[int, Experiment],
+) -> str | None:
+    """Why the flight at this index cannot be compared, or None if it can."""
+    trial_id = trial_ids[index]
+    if row is None:
+        return f"there is no trial {trial_id}; its campaign may have been deleted"
+    if trial_id in trial_ids[:index]:
+        return f"flight {row.number} of campaign {row.campaign_id} is listed twice"
+    if row.state not in history.FLOWN:
+        return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
+    first = next(found[other] for other in trial_ids if other in found)
+    own, wanted = experiments[row.campaign_id], experiments[first.campaign_id]
+    if own.error_unit != wanted.error_unit:
+        differ = f"is in {own.error_unit}", f"in {wanted.error_unit}"
+    elif own.measure != wanted.measure:
+        differ = f"is of {own.measure}", f"of {wanted.measure}"
+    elif own.window_s != wanted.window_s:
+        differ = f"covers a window of {own.window_s:g} s", f"one of {wanted.window_s:g} s"
     else:
-        how, what = "flown with different settings of the vehicle", "One vehicle with different settings"
+        return None
     return (
-        how,
-        f"{what}. The errors depend on this as well as on the gains. To compare gains, fly both in one campaign.",
+        f"the error of flight {row.number} of campaign {row.campaign_id} {differ[0]}, that of flight {first.number} "
+        f"of campaign {first.campaign_id} {differ[1]}: the errors are different quantities"
     )
 
 
-def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) -> FlightPair:
-    """Compare two flights of the same gains in one campaign: whether anything has changed between them."""
-    errors = dict(zip(group.numbers, group.errors, strict=True))
-    earlier, later = sorted((against.row.number, side.row.number))
-    found = drift_of([Group(group.gains, (earlier, later), (errors[earlier], errors[later]))], side.scatter)
-    assert found is not None
-    amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
-    relation = (
-        "more than the scatter of flights" if found.confidence >= CONFIDENCE else "no more than the scatter of flights"
-    )
-    sentence = (
-        f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {relation} "
-        f"({confidence_text(found.confidence)} confidence that something has changed)."
-    )
-    return _pair(
-        side,
-        against,
-        "repeats",
-        sentence,
-        difference=found.difference if side.row.number == later else -found.difference,
-        standard_error=found.standard_error,
-        confidence=found.confidence,
+def vehicle_name(campaign: CampaignRow) -> str:
+    """A registered vehicle's own name, otherwise its kind."""
+    vehicle = campaign.vehicle
+    return vehicle.name if vehicle.registered else vehicle.title
+
+
+def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
+    """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
+    row, campaign = side.row, side.campaign
+    kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
+    strategy = STRATEGIES[campaign.strategy]
+    options = fleet.options_of(campaign)
+    found = [
+        FlightSetting(title="Vehicle", unit="", value=vehicle_name(campaign)),
+        *_options(options, () if kind is None else kind.options),
+        FlightSetting(title="Experiment", unit="", value=side.experiment.title),
+        *_options(
+            with_defaults(campaign.definition["experiment_options"], side.experiment.options), side.experiment.options
+        ),
+        FlightSetting(title="Strategy", unit="", value=strategy.title),
+        *_options(campaign.definition["options"], strategy.options),
+        # As text, because the difference between two seeds has no meaning.
+        FlightSetting(title="Seed of the campaign", unit="", value=str(campaign.definition["seed"])),
+    ]
+    if battery:
+        found.append(FlightSetting(title="Battery", unit="", value=battery))
+    if row.landing_battery_v is not None:
+        found.append(FlightSetting(title="Battery after landing", unit="V", value=round(row.landing_battery_v, 2)))
+    reported = row.settings.items() - options.items()
+    return found + [FlightSetting(title=name, unit="", value=value) for name, value in sorted(reported)]
+
+
+def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[FlightDifference]:
+    """The settings that are not the same in all flights; None for a flight without that setting."""
+    titles = dict.fromkeys((one.title, one.unit) for settings in flights for one in settings)
+    values = [{(one.title, one.unit): one.value for one in settings} for settings in flights]
+    return _differing((title, unit, [own.get((title, unit)) for own in values]) for title, unit in titles)
+
+
+def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference]:
+    """The gains that are not the same in all flights."""
+    known = {gain.name: gain for side in sides for gain in side.experiment.space.gains}
+    names = dict.fromkeys(name for side in sides for name in side.row.gains)
+    return _differing(
+        (name, known[name].unit if name in known else "", [side.row.gains.get(name) for side in sides])
+        for name in names
     )
 
 
-def _changed(side: ComparisonFlight, against: ComparisonFlight, comparison: Comparison) -> str:
-    """Sentence for the same gains in two campaigns."""
-    amount = measured(abs(comparison.difference), comparison.standard_error, side.experiment.error_unit)
-    apart = f"{side.name} is {amount} {direction_of(comparison.difference)} than {against.name}"
-    if comparison.confidence is None:
-        return f"Not known yet: with the same gains in two campaigns {apart}. {SCATTER_NOT_KNOWN}"
-    relation = (
-        "within the scatter"
-        if comparison.verdict == "unresolved"
-        else "more than the scatter: the vehicle or its environment has changed"
-    )
-    sure = confidence_text(comparison.confidence)
-    return f"The same gains in two campaigns: {apart}, {relation} ({sure} confidence)."
+def _options(values: Mapping[str, OptionValue], known: Iterable[Option]) -> list[FlightSetting]:
+    described = {option.name: option for option in known}
+    return [
+        FlightSetting(
+            title=described[name].title if name in described else name,
+            unit=described[name].unit if name in described else "",
+            value=value,
+        )
+        for name, value in values.items()
+    ]
 
 
-def _comparison_sentence(
-    side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group, comparison: Comparison
-) -> str:
-    amount = measured(abs(comparison.difference), comparison.standard_error, side.experiment.error_unit)
-    pair = f"{named(own, side.name)} against {named(other, against.name)}"
-    if comparison.confidence is None:
-        return f"Not known yet: {pair}, {amount} {direction_of(comparison.difference)}. {SCATTER_NOT_KNOWN}"
-    both = f"{amount} {direction_of(comparison.difference)}, {confidence_text(comparison.confidence)} confidence"
-    if comparison.verdict == "unresolved":
-        whose = f"with the gains of {side.name}", f"with the gains of {against.name}"
-        return f"Unresolved: {pair}, {both}. {deciding_flights(comparison, *whose, ' and ')}"
-    return f"{capitalised(named(own, side.name))} is {comparison.verdict} than {named(other, against.name)}: {both}."
+def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> list[FlightDifference]:
+    return [
+        FlightDifference(title=title, unit=unit, values=values, changes=[_change(values[0], one) for one in values])
+        for title, unit, values in rows
+        if any(one != values[0] for one in values)
+    ]
+
+
+def _change(first: OptionValue | None, value: OptionValue | None) -> int | float | None:
+    numbers = [each for each in (first, value) if isinstance(each, int | float) and not isinstance(each, bool)]
+    return numbers[1] - numbers[0] if len(numbers) == 2 else None

@@ -109,12 +109,23 @@ class Definition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """Predicted interval of the error, with probability `confidence`."""
+
+    lower: float
+    upper: float
+    confidence: float = 0.9
+
+    def __contains__(self, error: float) -> bool:
+        return self.lower <= error <= self.upper
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """Predicted error of a flight, and its 90 % interval if there is one."""
+    """Predicted error of a flight, and its interval if there is one."""
 
     error: float
-    lower: float | None = None
-    upper: float | None = None
+    interval: Interval | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from app.campaigns.schemas import Campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.conflict_checks import state_label
 from app.core import formatting
-from app.core.tuning.strategy import Interval
+from app.core.definition import Interval
 from app.db.models import TrialPhotoRow
 from app.figures.base import Cell, Column
 from app.reports.service import Report

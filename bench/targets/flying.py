@@ -7,10 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Flight, flight_seed
+from app.core.definition import Flight, Interval, flight_seed
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import PolicySpace, Vector
-from app.core.tuning.strategy import Interval
 from bench.targets.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error
 
 EXPERIMENT: Final = Takeoff()

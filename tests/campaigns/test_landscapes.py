@@ -7,7 +7,6 @@ from fastapi.testclient import TestClient
 
 from app.campaigns import landscapes, tasks
 from app.campaigns.tasks import LandscapeJob
-from app.core.tuning.landscape import predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
@@ -41,7 +40,7 @@ def run_landscapes(database: Database) -> int:
             plan = landscapes.read_plan(session, campaign_id, order)
         survey = landscapes.plan(plan)
         assert survey is not None
-        landscape = survey.landscape(predict_points(survey.predict_errors, survey.points()))
+        landscape = survey.landscape(survey.predict_errors(survey.points()))
         with database.write() as session:
             jobs.finish_job(session, job_id, worker=WORKER, result=landscapes.as_json(landscape, order))
         count += 1

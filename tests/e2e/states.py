@@ -27,7 +27,6 @@ from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
-from app.core.tuning.landscape import predict_points
 from app.db.base import Base
 from app.db.models import EventRow, ProposalRow
 from app.db.session import Database
@@ -161,7 +160,7 @@ class States:
             plan = landscapes.read_plan(session, campaign_id, order)
         survey = landscapes.plan(plan)
         assert survey is not None, "there is nothing to draw"
-        found = survey.landscape(predict_points(survey.predict_errors, survey.points()))
+        found = survey.landscape(survey.predict_errors(survey.points()))
 
         def store(session: Session) -> None:
             landscapes.request_landscape(session, campaign_id)

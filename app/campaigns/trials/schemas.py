@@ -8,9 +8,9 @@ from pydantic import AwareDatetime, Field, model_validator
 from app.campaigns.schemas import Variant
 from app.common.schemas import Gains, Gate, Number, OptionValue, Reason, Request, Schema, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
+from app.core.definition import Interval
 from app.core.records.glitches import Glitch
 from app.core.statistics.comparisons import Verdict
-from app.core.tuning.strategy import Interval
 from app.vehicles.flight_end import FlightEnd
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]

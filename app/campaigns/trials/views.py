@@ -16,14 +16,13 @@ from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.common.conflict_checks import allowed
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
-from app.core.definition import Flight
+from app.core.definition import Flight, Interval
 from app.core.experiments.base import Scatter
 from app.core.formatting import named_flights, percent, short
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
-from app.core.tuning.strategy import Interval
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.flight_end import Requester, cause_text, end_text, is_worded, unstaged_text

@@ -119,11 +119,10 @@ def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
 
     Empty without a model.
     """
-    modelled = experiment.modelled
-    if modelled is None:
+    if not isinstance(experiment, ModelledExperiment):
         return NO_PARAMETERS
-    sd: Vector = np.array([parameter.known_within for parameter in modelled.model_parameters]) / WIDEST_SD
-    return normal_distribution(modelled.nominal_model, np.diag(sd**2), origin="the data sheet")
+    sd: Vector = np.array([parameter.known_within for parameter in experiment.model_parameters]) / WIDEST_SD
+    return normal_distribution(experiment.nominal_model, np.diag(sd**2), origin="the data sheet")
 
 
 Matrix = NDArray[np.float64]
@@ -255,11 +254,6 @@ class Experiment(ABC):
         """The experiment with these settings, the others at their defaults; they must be free of problems."""
 
     @property
-    def modelled(self) -> "ModelledExperiment | None":
-        """The same experiment with its simple model; None if there is none, and nothing can then be predicted."""
-        return None
-
-    @property
     def reference(self) -> Samples | None:
         """What that channel is in a model run, on its grid, (n,), if a flight may be late in following it: its distance
         from the recorded channel is then what a model run explains. None: model runs explain its output."""
@@ -292,18 +286,13 @@ class Experiment(ABC):
 
 
 class ModelledExperiment(Experiment):
-    """An experiment with a simple model of its vehicle, which depends on no parameters of an autopilot unless the
-    experiment says otherwise."""
+    """An experiment with a simple model of its vehicle, by which flights are predicted. The model depends on no
+    parameters of an autopilot unless the experiment says otherwise."""
 
     model_parameters: tuple[ModelParameter, ...]
     search: SimplexSearch
     difference: float
     """Step of the finite differences of the gradient, as a share of each gain's scale."""
-
-    @property
-    def modelled(self) -> Self:
-        """The experiment itself."""
-        return self
 
     @property
     def nominal_model(self) -> Vector:

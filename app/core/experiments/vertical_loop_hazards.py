@@ -18,7 +18,7 @@ stuck on the ground, where the sum grows by 3 m per step, and with the estimate 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from app.core.control.vertical_guidance import (
     SPEED_ERROR_MAX,
     STEP_S,
 )
-from app.core.experiments.base import Check
+from app.core.experiments.base import Check, Matrix, ModelParameter
 from app.core.formatting import grouped, percent
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical import MEASUREMENT_DELAY_S, START_LATENCY_S, Counts
@@ -50,10 +50,6 @@ from app.core.models.vertical_hazards import (
 )
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples
-
-if TYPE_CHECKING:
-    from app.core.experiments.base import Matrix, ModelParameter
-
 
 MODELS: Final = 32
 """Number of simulated vehicles: the likely one, and quasi-random ones around it."""
@@ -78,9 +74,9 @@ _GOLDEN: Final = 0.6180339887498949
 class Runs:
     """Flights of one gain set: models (k, m), abort steps (k, a), and the kernels' reports (k, 7) and (k, a, 2)."""
 
-    models: "Matrix"
+    models: Matrix
     abort_steps: Counts
-    reports: "Matrix"
+    reports: Matrix
     aborts: Samples
 
 
@@ -101,7 +97,7 @@ def abort_steps(models: int, manoeuvre: Manoeuvre) -> Counts:
     return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
 
 
-def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, manoeuvre: Manoeuvre) -> Runs:
+def fly_runs(gains: Counts, safe_gains: Counts, models: Matrix, aborts_at: Counts, manoeuvre: Manoeuvre) -> Runs:
     """Simulate the manoeuvre on each model, and its aborts to `safe_gains`."""
     targets = manoeuvre.set_points.targets
     reports = np.empty((len(models), REPORT_SIZE))
@@ -116,8 +112,8 @@ def check_flights(
     gains: Counts,
     safe_gains: Counts,
     baseline: bool,
-    parameters: Sequence["ModelParameter"],
-    models: "Matrix",
+    parameters: Sequence[ModelParameter],
+    models: Matrix,
     ceiling_m: float,
     manoeuvre: Manoeuvre,
 ) -> tuple[Check, ...]:
@@ -145,7 +141,7 @@ def check_flights(
     )
 
 
-def divergence_distance(reports: "Matrix", set_point_m: float) -> Vector:
+def divergence_distance(reports: Matrix, set_point_m: float) -> Vector:
     """Distance from the set point of each flight that fell back to the ground or still moves away at its end.
 
     Zero for the others: (k, 7) → (k,).
@@ -155,7 +151,7 @@ def divergence_distance(reports: "Matrix", set_point_m: float) -> Vector:
     return np.where(reports[:, FALLEN_STEP] >= 0.0, set_point_m, np.where(moves_away, last, 0.0))
 
 
-def undamped_swing(reports: "Matrix") -> Vector:
+def undamped_swing(reports: Matrix) -> Vector:
     """Swing of the climb rate in the last third of each flight, m/s, if it has not decayed since the middle third.
 
     Zero if it has, or if the vehicle is at rest: (k, 7) → (k,).
@@ -164,7 +160,7 @@ def undamped_swing(reports: "Matrix") -> Vector:
     return np.where((middle > 0.0) & (last >= UNDAMPED * middle), last, 0.0)
 
 
-def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: float, noun: str, baseline: bool) -> Check:
+def _altitude(runs: Runs, parameters: Sequence[ModelParameter], ceiling_m: float, noun: str, baseline: bool) -> Check:
     worst = int(np.argmax(runs.reports[:, HIGHEST_M]))
     highest_m = float(runs.reports[worst, HIGHEST_M])
     event = "highest" if highest_m < _CUT_OFF_M else f"above {LOST_M:.0f} m"
@@ -188,7 +184,7 @@ def _rises(highest_m: float) -> str:
     return f"rises to {highest_m:.2f} m"
 
 
-def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float, noun: str) -> Check:
+def _divergence(runs: Runs, parameters: Sequence[ModelParameter], set_point_m: float, noun: str) -> Check:
     distances = divergence_distance(runs.reports, set_point_m)
     worst = int(np.argmax(distances))
     distance_m, fallen_step = float(distances[worst]), float(runs.reports[worst, FALLEN_STEP])
@@ -202,7 +198,7 @@ def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m:
     return Check("divergence", False, f"A simulated {noun} {did}, with {case}.", distance_m, 0.0, case=case)
 
 
-def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"], noun: str) -> Check:
+def _oscillation(runs: Runs, parameters: Sequence[ModelParameter], noun: str) -> Check:
     swings = undamped_swing(runs.reports)
     worst = int(np.argmax(swings))
     swing_m_s = float(swings[worst])
@@ -225,7 +221,7 @@ _ABORTS: Final = {
 """Name and unit of the check of each reported value of an abort."""
 
 
-def _abort(place: int, runs: Runs, allowed: "Matrix", limits: Vector, parameters: Sequence["ModelParameter"]) -> Check:
+def _abort(place: int, runs: Runs, allowed: Matrix, limits: Vector, parameters: Sequence[ModelParameter]) -> Check:
     """Check the abort that exceeds the most what is `allowed` for its vehicle, shape (k, 2): the limit, or beyond it
     what the safe gains do."""
     name, unit = _ABORTS[place]
@@ -242,7 +238,7 @@ def _abort(place: int, runs: Runs, allowed: "Matrix", limits: Vector, parameters
     return Check(name, passed, sentence, worst=value, limit=limit, case=case)
 
 
-def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
+def _case(parameters: Sequence[ModelParameter], model: Vector, step: float | None = None, event: str = "") -> str:
     """Description of the vehicle, and the time of the event, counted from the command."""
     parts = [
         f"{parameter.title.lower()} {short_value(value, parameter.unit)}"

@@ -23,10 +23,16 @@ import numpy as np
 
 from app.core.definition import Flight
 from app.core.experiments.base import Matrix, Scatter
+from app.core.formatting import confidence_text, count
 from app.core.policy import Gains, Vector
 
 Verdict = Literal["better", "worse", "unresolved", "not known yet"]
 """`unresolved`: the flights do not decide the comparison; `not known yet`: the scatter is unknown."""
+
+SCATTER_NOT_KNOWN: Final = (
+    "The flight-to-flight scatter under this autopilot is unknown, so the difference cannot be tested. Fly one of "
+    "the gain sets again."
+)
 
 MAX_FURTHER_FLIGHTS: Final = 100
 _OPTIMISM_POINTS: Final = 2001
@@ -331,12 +337,29 @@ def _further(
 ) -> FlightsToDecide | None:
     """Add flights to the policy with fewer (the first of equals) until the same difference would be decided."""
     sizes = [first.size, second.size]
-    for count in range(1, MAX_FURTHER_FLIGHTS + 1):
+    for added in range(1, MAX_FURTHER_FLIGHTS + 1):
         sizes[0 if sizes[0] <= sizes[1] else 1] += 1
         standard_error = _standard_error(scatter, (sizes[0], sizes[1]))
-        look = looks + count if looks else 0
+        look = looks + added if looks else 0
         allowance = candidates * max(look * (look + 1), 1)
-        freedom = scatter.degrees_of_freedom + count
+        freedom = scatter.degrees_of_freedom + added
         if _certainty(first.mean - second.mean, standard_error, freedom, allowance) >= confidence:
             return FlightsToDecide(first=sizes[0] - first.size, second=sizes[1] - second.size)
     return None
+
+
+def undecided(comparison: Comparison, found: str, further: str = "") -> str:
+    """Sentence for what was `found` without a result; `further` says what would decide."""
+    if comparison.confidence is None:
+        return f"Not known yet: {found}. {SCATTER_NOT_KNOWN}"
+    return f"Unresolved: {found}, {confidence_text(comparison.confidence)} confidence. {further}"
+
+
+def deciding_flights(comparison: Comparison, first: str, second: str, joint: str = ", ") -> str:
+    """The further flights that would decide an unresolved comparison, in a sentence; `first` and `second` say of whose
+    gains."""
+    further = comparison.further
+    if further is None:
+        return "Even 100 more flights would not resolve it."
+    shares = joint.join(f"{n} {whose}" for n, whose in ((further.first, first), (further.second, second)) if n)
+    return f"If the difference persists, {count(further.total, 'more flight')} would resolve it: {shares}."

@@ -25,9 +25,8 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Box, Vector
 from app.core.tuning.calibration import Calibration, calibrate
-from app.core.tuning.copter_model import CopterModel
+from app.core.tuning.copter_model import CopterModel, LimitedModel
 from app.core.tuning.evidence import Evidence
-from app.core.tuning.limited_model import LimitedModel
 from app.core.tuning.predictions import MODELS as PLAUSIBLE
 from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
 

@@ -6,19 +6,28 @@ autopilot's replica along the reference of the best flight, with the disturbance
 keeps the margin from ringing, and moves the throttle at most 1.5 times as much as the gains of the first flight.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 import numpy as np
 
 from app.core.analysis.analysis import find_unexplained, is_alike
-from app.core.analysis.loop import AltitudeLoop, GainSpace, LoggedFlight
-from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
+from app.core.analysis.loop import AltitudeLoop, GainSpace, LinearLoop, LoggedFlight
+from app.core.analysis.margin import (
+    EXTRA_LAG_S,
+    LARGEST_MARGIN,
+    REQUIRED_MARGIN,
+    RINGING_DAMPING,
+    gain_margin,
+    robust_damping,
+)
 from app.core.analysis.prediction import FlightModel, Prediction
+from app.core.analysis.proposal import LARGEST_ACTIVITY, search
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
-from app.core.definition import Flight, best_flight
+from app.core.definition import Flight, Interval, best_flight
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.experiments.base import (
     FittedParameter,
@@ -30,17 +39,92 @@ from app.core.experiments.base import (
 from app.core.experiments.copter_steps import COPTERS, CopterSteps, copter_of, vector_of
 from app.core.formatting import count, short
 from app.core.models.copter import Copter
-from app.core.policy import Box, Vector
+from app.core.policy import Box, PolicySpace, Vector
 from app.core.tuning.calibration import fitted_flights
-from app.core.tuning.limited_model import LimitedModel
 from app.core.tuning.predictions import FlightPrediction, interval_reach
-from app.core.tuning.strategy import Interval, positive_interval, with_band
+from app.core.tuning.strategy import positive_interval, with_band
+
+_V = TypeVar("_V")
 
 _COMPARED: Final = "For comparison: "
 _DIGITS: Final = 3
 _MODEL_ERROR: Final = 0.04
 """Relative error of even the best fit: without it, 75 % of the flights of random vehicles under PX4 were inside their
 90 % interval."""
+
+
+class LimitedModel(ABC, Generic[_V]):
+    """What models of a campaign share whose gains are limited by more than the error: altitude steps. The error alone
+    drives the gains to their bounds. So the throttle may move little more than with the gains of the first flight, and
+    no likely vehicle may ring (`app.core.analysis.proposal`).
+
+    Gains have shape (n,). `base` is the best flight, `first_gains` are those of the first one."""
+
+    least_improvement: Final = 0.05
+    base: Flight
+    first_gains: Vector
+    policy_space: PolicySpace
+
+    def _limit_by(self, space: PolicySpace, flights: Sequence[Flight]) -> None:
+        """The gains, and the first of the flights that are valid."""
+        first = next(flight for flight in flights if flight.outcome == "valid")
+        self.policy_space, self.first_gains = space, space.vector(first.gains)
+
+    @property
+    @abstractmethod
+    def vehicles(self) -> Sequence[_V]:
+        """Those of the gate, for which gains are searched: the likeliest one first."""
+
+    @abstractmethod
+    def loop(self, gains: Vector) -> LinearLoop[_V]:
+        """The loop with these gains."""
+
+    @abstractmethod
+    def flown(self, gains: Vector) -> tuple[float, float]:
+        """Predicted error, m, and throttle activity of the likeliest vehicle, in the weather of the best flight."""
+
+    def merits(self, gains: Matrix) -> Vector:
+        """Errors of many gain sets: (c, n) → (c,)."""
+        return np.array([self.flown(each)[0] for each in gains])
+
+    def is_worth_a_flight(self, here: Vector, there: Vector) -> bool:
+        """Whether a step pays, or leaves gains that ring."""
+        now, then = self.merits(np.stack((here, there))).tolist()
+        before, after = (robust_damping(self.loop(gains), self.vehicles) for gains in (here, there))
+        return bool(then <= (1.0 - self.least_improvement) * now) or before < RINGING_DAMPING <= after
+
+    def found(self, space: GainSpace, starts: Sequence[Mapping[str, float]]) -> Vector | None:
+        """The best allowed gains of the space, of which those that it lacks are the best flight's; None if there are
+        none."""
+
+        def whole(gains: Mapping[str, float]) -> Vector:
+            return self.policy_space.vector({**self.base.gains, **gains})
+
+        gains = search(
+            space,
+            [self.base.gains, *starts],
+            self.policy_space.mapping(self.first_gains),
+            fly=lambda gains: self.flown(whole(gains)),
+            loop_of=lambda gains: self.loop(whole(gains)),
+            vehicles=self.vehicles,
+        )
+        return None if gains is None else whole(gains)
+
+    def limits(self, gains: Vector) -> tuple[str, str]:
+        """Sentences about throttle activity and margin."""
+        loop = self.loop(gains)
+        activity = self.flown(gains)[1] / self.flown(self.first_gains)[1]
+        margin = gain_margin(loop, self.vehicles[0])
+        beyond = "at least " if margin == LARGEST_MARGIN else ""
+        moves = (
+            f"The throttle moves {activity:.2f} times as much as with the gains of the first flight; "
+            f"{LARGEST_ACTIVITY:g} times is allowed."
+        )
+        rings = (
+            f"With {1e3 * EXTRA_LAG_S:.0f} ms more {loop.texts.lateness}, the altitude begins to ring with {beyond}"
+            f"{margin:.1f} times the {loop.texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
+        )
+        return moves, rings
 
 
 class CopterModel(LimitedModel[Copter]):

@@ -72,7 +72,7 @@ def _fit(definition: Definition, experiments: Mapping[str, Experiment]) -> Itera
     if definition.strategy not in STRATEGIES or definition.experiment not in experiments:
         return
     strategy, experiment = STRATEGIES[definition.strategy], experiments[definition.experiment]
-    if experiment.modelled is None:
+    if not isinstance(experiment, ModelledExperiment):
         yield from _without_model(definition)
         return
     wanted = {"strategy": strategy} | ({"start.kind": SIMPLEX} if definition.start.kind == "simplex" else {})
@@ -116,7 +116,7 @@ def _check_start(definition: Definition, experiment: Experiment, space: PolicySp
         reason = "is required with start.kind 'campaign', and not allowed with any other"
         raise _invalid_start(Problem("start.donor", reason))
     if start.log is not None:
-        _check_log(definition, experiment.modelled, start.log)
+        _check_log(definition, experiment, start.log)
     if start.kind == "given" and start.gains is not None:
         space.check(start.gains, field="start.gains")
     elif start.kind != "simplex":
@@ -124,11 +124,11 @@ def _check_start(definition: Definition, experiment: Experiment, space: PolicySp
         _check_bounds_hold(space, space.complete(given, field="start.gains"))
 
 
-def _check_log(definition: Definition, modelled: ModelledExperiment | None, log: LogEvidence) -> None:
-    if definition.start.kind != "given" or not isinstance(modelled, CopterSteps):
+def _check_log(definition: Definition, experiment: Experiment, log: LogEvidence) -> None:
+    if definition.start.kind != "given" or not isinstance(experiment, CopterSteps):
         reason = "is allowed only with start.kind 'given', for altitude steps under ArduCopter or PX4"
         raise _invalid_start(Problem("start.log", reason))
-    known = {each.name: (each.lower, each.upper) for each in modelled.model_parameters}
+    known = {each.name: (each.lower, each.upper) for each in experiment.model_parameters}
     if log.vehicle.keys() != known.keys():
         reason = f"must have {', '.join(known)}"
         raise _invalid_start(Problem("start.log.vehicle", reason))
@@ -143,7 +143,7 @@ def _check_log(definition: Definition, modelled: ModelledExperiment | None, log:
     if wrong:
         raise _invalid_start(*wrong)
     try:
-        modelled.exactly_under(log.parameters)
+        experiment.exactly_under(log.parameters)
     except InputError as error:
         problems = (Problem(f"start.log.parameters.{each.field}", each.reason) for each in error.problems)
         raise _invalid_start(*problems) from error

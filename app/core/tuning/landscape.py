@@ -22,7 +22,7 @@ from app.core.experiments.base import Experiment, Matrix
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.proposals import model_of
-from app.core.tuning.transfer import informed_evidence
+from app.core.tuning.transfer import transfer
 
 ErrorsOf = Callable[[Matrix], Vector]
 """Gains (k, g) → the errors a model predicts for them, (k,)."""
@@ -117,8 +117,7 @@ def plan_grid(campaign: Evidence[Experiment], around: Gains, marks: Sequence[Gai
     space = campaign.space
     if not has_model(campaign) or free_gains(space) < 2:
         return None
-    evidence, _ = informed_evidence(campaign)
-    predict_errors = model_of(evidence).errors
+    predict_errors = model_of(transfer(campaign).evidence).errors
     centre = space.nearest(space.vector(around))
     marked = np.array([space.vector(gains) for gains in (*marks, space.mapping(centre))])
     return LandscapeGrid(
@@ -128,11 +127,6 @@ def plan_grid(campaign: Evidence[Experiment], around: Gains, marks: Sequence[Gai
         pairs=tuple(_pairs(space, centre, predict_errors)),
         values=tuple(_values(gain, column) for gain, column in zip(space.gains, marked.T, strict=True)),
     )
-
-
-def predict_points(predict_errors: ErrorsOf, gains: Matrix) -> Vector:
-    """Predicted errors at a chunk of points, (c, n) → (c,): the work of a separate process. Pure."""
-    return predict_errors(gains)
 
 
 def free_gains(space: PolicySpace) -> int:

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, StopRule
+from app.core.definition import Definition, Flight, Interval, StopRule
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
@@ -24,7 +24,6 @@ from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import predict_flight
 from app.core.tuning.proposals import next_proposal
-from app.core.tuning.strategy import Interval
 
 SHORTEST_S: Final = 10.0
 MOST_TAKEOFFS: Final = 8

@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Flight
+from app.core.definition import Flight, Interval
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, normal_distribution
 from app.core.formatting import count
 from app.core.models.vertical import ENTERED
@@ -36,7 +36,6 @@ from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import (
     CONFIDENCE,
     Explanation,
-    Interval,
     Kind,
     ModelPrediction,
     Proposal,
@@ -96,13 +95,13 @@ class TrackRecord:
         return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 
-def is_informative(lower: float | None, *, corrected: bool) -> bool:
-    """Whether a prediction with an interval from `lower` on says anything.
+def is_informative(interval: Interval | None, *, corrected: bool) -> bool:
+    """Whether a prediction with this interval says anything.
 
     Before the first valid flight the model is not `corrected`. An interval that then reaches down to zero (0 … 2.2 m)
     allows any flight, and is no prediction.
     """
-    return corrected or lower is None or lower > 0.0
+    return corrected or interval is None or interval.lower > 0.0
 
 
 def track_record(flights: Sequence[Flight]) -> TrackRecord:
@@ -118,14 +117,10 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
         if flight.outcome != "valid" or flight.error is None:
             continue
         prediction, gains = flight.predicted, frozenset(flight.gains.items())
-        if (
-            prediction is not None
-            and prediction.lower is not None
-            and prediction.upper is not None
-            and is_informative(prediction.lower, corrected=best is not None)
-        ):
+        interval = None if prediction is None else prediction.interval
+        if interval is not None and is_informative(interval, corrected=best is not None):
             of += 1
-            inside += prediction.lower <= flight.error <= prediction.upper
+            inside += flight.error in interval
         if prediction is not None and best is not None and gains not in seen:
             agreed = (prediction.error - best) * (flight.error - best)
             agreeing += agreed > 0.0
@@ -208,10 +203,7 @@ def interval_scale(flights: Sequence[Flight]) -> float:
         )
         ** 2
         for flight in flights
-        if flight.error is not None
-        and (interval := flight.predicted) is not None
-        and interval.lower is not None
-        and interval.upper is not None
+        if flight.error is not None and flight.predicted and (interval := flight.predicted.interval)
     ]
     return float(np.sqrt((_PRIOR_WEIGHT + sum(squares)) / (_PRIOR_WEIGHT + len(squares))))
 

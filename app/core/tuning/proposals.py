@@ -12,16 +12,15 @@ from app.core.policy import Gains
 from app.core.statistics.comparisons import Group
 from app.core.tuning.calibration import fitted_flights
 from app.core.tuning.campaign_models import FITTED, changed_parameters, known_distribution
-from app.core.tuning.confirmation import confirm, describe_step
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
-from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict
+from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict, confirm, describe_step
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import propose as by_hand
 from app.core.tuning.strategy import Explanation, Kind, Predictor, Proposal, proposal_of
-from app.core.tuning.transfer import informed_evidence
+from app.core.tuning.transfer import transfer
 
 _ORIGIN = {
     "default": "the vehicle's default gains",
@@ -41,14 +40,15 @@ def next_proposal(campaign: Evidence[Experiment]) -> Proposal:
     """
     if not has_model(campaign):
         return _manual_proposal(campaign)
-    evidence, taken = informed_evidence(campaign)
+    warm = transfer(campaign)
+    evidence = warm.evidence
     if not evidence.valid:
         return _start(evidence)
     strategy = STRATEGIES[evidence.definition.strategy]
     proposal = strategy.propose(evidence)
     number = proposal.explanation.base_flight if strategy.corrects_model else None
     base = next((flight for flight in evidence.flights if flight.number == number), None)
-    return _with_notes(_confirmed(evidence, with_interval(evidence, proposal, base=base)), evidence, taken)
+    return _with_notes(_confirmed(evidence, with_interval(evidence, proposal, base=base)), evidence, warm.sentence)
 
 
 def _manual_proposal(evidence: Evidence[Experiment]) -> Proposal:
@@ -77,7 +77,7 @@ def _start(evidence: Evidence[ModelledExperiment]) -> Proposal:
     start = with_interval(evidence, start, base=None)
     outlook = (
         f"predicts {short(predicted.error)} {experiment.error_unit}"
-        if is_informative(None if start.interval is None else start.interval.lower, corrected=False)
+        if is_informative(start.interval, corrected=False)
         else "is too uncertain to predict its error"
     )
     summary = f"{_describe_start(evidence, gains)}; {source} {outlook}."
@@ -223,7 +223,7 @@ def flight_predictor(campaign: Evidence[Experiment]) -> FlightPredictor | None:
     """
     if not has_model(campaign):
         return None
-    evidence, _ = informed_evidence(campaign)
+    evidence = transfer(campaign).evidence
     is_corrected = bool(evidence.valid) and STRATEGIES[evidence.definition.strategy].corrects_model
     base = evidence.best if is_corrected else None
     return FlightPredictor(evidence=evidence, model=model_of(evidence), base=base)

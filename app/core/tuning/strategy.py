@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Literal, Protocol
 
-from app.core.definition import Option
+from app.core.definition import Interval, Option
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
 from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -28,18 +28,6 @@ class LadderStep:
     gains: dict[str, float]
     predicted_error: float
     clipped: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Interval:
-    """Predicted interval of the error, with probability `confidence`."""
-
-    lower: float
-    upper: float
-    confidence: float = 0.9
-
-    def __contains__(self, error: float) -> bool:
-        return self.lower <= error <= self.upper
 
 
 def positive_interval(lower: float, upper: float) -> Interval:
@@ -149,7 +137,7 @@ class Strategy:
     def works_with(self, experiment: Experiment) -> bool:
         """Whether a campaign may combine this strategy with the experiment."""
         supported = not self.kinds or isinstance(experiment, self.kinds)
-        return supported and not (self.needs_model and experiment.modelled is None)
+        return supported and (isinstance(experiment, ModelledExperiment) or not self.needs_model)
 
 
 def band_channels(output: str) -> tuple[str, str]:

@@ -35,35 +35,32 @@ _TAKEN: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transfer:
-    """Result of a transfer.
+    """Result of a transfer: the `evidence` that the strategy has to use, with a `sentence` about it.
 
-    `agreement` is None without a donor, and until this vehicle has flown; `experiment` and `step_fraction` are those
-    the strategy has to use.
+    `agreement` is None without a donor, and until this vehicle has flown; the sentence is then empty.
     """
 
-    experiment: ModelledExperiment
-    step_fraction: float
-    agreement: float | None
-    sentence: str
+    evidence: Evidence[ModelledExperiment]
+    agreement: float | None = None
+    sentence: str = ""
 
 
-def informed_evidence(plain: Evidence[ModelledExperiment]) -> tuple[Evidence[ModelledExperiment], str]:
+def transfer(plain: Evidence[ModelledExperiment]) -> Transfer:
     """The evidence with the model and the step limit that follow from the donor's flight and with the autopilot's
-    parameters as flown, before the first own flight those of the donor's, whose vehicle is of the same kind; and a
-    sentence about the transfer, empty if there is none."""
-    warm = transfer(plain)
-    flown = plain.flights if plain.donor is None else (plain.donor, *plain.flights)
-    definition = replace(plain.definition, step_fraction=warm.step_fraction)
-    experiment = as_flown(warm.experiment, flown)
-    return replace(plain, definition=definition, experiment=experiment, plain=plain), warm.sentence
+    parameters as flown, before the first own flight those of the donor's, whose vehicle is of the same kind.
 
+    The transfer is computed from the first valid flight, for the whole campaign; only the next step is shortened.
+    """
+    donor, valid = plain.donor, plain.valid
+    flown = plain.flights if donor is None else (donor, *plain.flights)
 
-def transfer(evidence: Evidence[ModelledExperiment]) -> Transfer:
-    """Compute the transfer from the first valid flight, for the whole campaign; only the next step is shortened."""
-    definition, experiment, valid, donor = evidence.definition, evidence.experiment, evidence.valid, evidence.donor
-    plain = Transfer(experiment=experiment, step_fraction=definition.step_fraction, agreement=None, sentence="")
+    def modelled(experiment: ModelledExperiment, share: float = 1.0) -> Evidence[ModelledExperiment]:
+        definition = replace(plain.definition, step_fraction=plain.definition.step_fraction * share)
+        return replace(plain, definition=definition, experiment=as_flown(experiment, flown), plain=plain)
+
+    experiment = plain.experiment
     if donor is None or not valid:
-        return plain
+        return Transfer(evidence=modelled(experiment))
     agreed, apart, own = _agreement(experiment, donor, valid[0])
     unit = CHANNEL_UNITS.get(experiment.output, "")
     numbers = (
@@ -72,14 +69,11 @@ def transfer(evidence: Evidence[ModelledExperiment]) -> Transfer:
     )
     if agreed < LEAST_AGREEMENT:
         sentence = f"Nothing is used from the other vehicle: {numbers}, less than {percent(LEAST_AGREEMENT)}."
-        return replace(plain, agreement=agreed, sentence=sentence)
-    is_first_step = len(valid) == 1
-    shortened = (
-        f" The first step is limited to {percent(agreed)} of its maximum." if is_first_step and agreed < 1.0 else ""
-    )
+        return Transfer(evidence=modelled(experiment), agreement=agreed, sentence=sentence)
+    share = agreed if len(valid) == 1 else 1.0
+    shortened = f" The first step is limited to {percent(share)} of its maximum." if share < 1.0 else ""
     return Transfer(
-        experiment=_informed(experiment, donor, agreed),
-        step_fraction=definition.step_fraction * (agreed if is_first_step else 1.0),
+        evidence=modelled(_informed(experiment, donor, agreed), share),
         agreement=agreed,
         sentence=f"{_TAKEN[isinstance(experiment, CALIBRATED)]}: {numbers}.{shortened}",
     )

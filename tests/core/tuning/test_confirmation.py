@@ -9,10 +9,9 @@ import pytest
 
 from app.core.definition import Definition, Flight, StopRule
 from app.core.experiments.base import Experiment
-from app.core.tuning.confirmation import confirm, verdict_sentence
 from app.core.tuning.evidence import Evidence
 from app.core.tuning.proposals import Advice, advise
-from app.core.tuning.stop_rules import evaluate_stop_rule
+from app.core.tuning.stop_rules import confirm, evaluate_stop_rule, verdict_sentence
 from app.core.tuning.strategy import Explanation, Kind, Proposal
 from tests.core.tuning.bowl import QuadraticExperiment, fly
 from tests.core.tuning.defined import evidence

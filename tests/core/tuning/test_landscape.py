@@ -11,7 +11,7 @@ from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.policy import Gains
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.landscape import Landscape, plan_grid, predict_points
+from app.core.tuning.landscape import Landscape, plan_grid
 from app.core.tuning.predictions import predict_flight
 from tests.core.tuning.defined import next_proposal
 from tests.core.tuning.flying import compiled_only
@@ -31,7 +31,7 @@ def flight(number: int = 1, gains: Gains = START, hover: float = 0.6) -> Flight:
 def surveyed(definition: Definition, flights: Sequence[Flight], centre: Gains, *marks: Gains) -> Landscape:
     survey = plan_grid(evidence_of(definition, flights), centre, marks)
     assert survey is not None
-    return survey.landscape(predict_points(survey.predict_errors, survey.points()))
+    return survey.landscape(survey.predict_errors(survey.points()))
 
 
 def error_by_hand(gains: Gains, by: Flight) -> float:
@@ -107,7 +107,7 @@ def test_a_warm_start_s_landscape_is_that_of_the_vehicle_it_starts_from() -> Non
     )
     survey = plan_grid(evidence_of(definition, (), donor=donor), tuned, ())
     assert survey is not None
-    assert predict_points(survey.predict_errors, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
+    assert survey.predict_errors(survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
 
 
 @compiled_only

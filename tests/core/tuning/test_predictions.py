@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from app.core.definition import Definition, Flight, Prediction
+from app.core.definition import Definition, Flight, Interval, Prediction
 from app.core.statistics.comparisons import groups_of
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from app.core.tuning.predictions import interval_scale, repeat_proposal, track_record, with_interval
@@ -22,8 +22,8 @@ CHANGED = "with new gains changed the error in the predicted direction (repeats 
 
 
 def told(flight: Flight, error: float, half: float | None = None) -> Flight:
-    edges = (None, None) if half is None else (error - half, error + half)
-    return replace(flight, predicted=Prediction(error=error, lower=edges[0], upper=edges[1]))
+    interval = None if half is None else Interval(lower=error - half, upper=error + half)
+    return replace(flight, predicted=Prediction(error=error, interval=interval))
 
 
 def proposal(a: float, b: float, base: Flight | None = None) -> Proposal:
@@ -89,7 +89,7 @@ def test_a_flight_carries_its_prediction() -> None:
     assert prediction_of(bare) == Prediction(error=1.0)
     done = with_interval(evidence(Definition(), QuadraticExperiment(), []), bare, base=None)
     assert done.interval is not None
-    assert prediction_of(done) == Prediction(error=1.0, lower=done.interval.lower, upper=done.interval.upper)
+    assert prediction_of(done) == Prediction(error=1.0, interval=done.interval)
 
 
 def test_another_flight_of_a_policy_is_expected_at_the_mean_of_its_flights() -> None:

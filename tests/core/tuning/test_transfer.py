@@ -7,6 +7,7 @@ import pytest
 
 from app.autopilots.registry import get_experiment
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
+from app.core.experiments.base import ModelledExperiment
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.campaign_models import as_flown
 from app.core.tuning.corrected_model import correct_by_bias
@@ -52,8 +53,8 @@ def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first
     found = transfer(evidence(WARM, TAKEOFF, [first], donor=donor()))
     assert found.agreement is not None
     assert 0.5 < found.agreement < 1.0
-    assert found.step_fraction == pytest.approx(found.agreement * WARM.step_fraction)
-    assert found.experiment.nominal_model.tolist() == calibrate(TAKEOFF, [donor()]).model.tolist()
+    assert found.evidence.definition.step_fraction == pytest.approx(found.agreement * WARM.step_fraction)
+    assert found.evidence.experiment.nominal_model.tolist() == calibrate(TAKEOFF, [donor()]).model.tolist()
     assert "replaces the data sheet" in found.sentence
     assert f"agreement {100.0 * found.agreement:.0f}\u00a0%" in found.sentence
     notes = next_proposal(WARM, [first], donor()).explanation.notes
@@ -64,7 +65,7 @@ def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first
 def test_the_step_is_shortened_for_the_second_flight_only() -> None:
     flights = [fly(1, TUNED, model(*ALIKE)), fly(2, {**TUNED, "kp": 1700}, model(*ALIKE))]
     found = transfer(evidence(WARM, TAKEOFF, flights, donor=donor()))
-    assert found.step_fraction == WARM.step_fraction
+    assert found.evidence.definition.step_fraction == WARM.step_fraction
     assert "first step" not in found.sentence
 
 
@@ -74,8 +75,8 @@ def test_an_unlike_vehicle_takes_nothing_over() -> None:
     found = transfer(evidence(WARM, TAKEOFF, [first], donor=donor()))
     assert found.agreement is not None
     assert found.agreement < 0.5
-    assert found.experiment is TAKEOFF
-    assert found.step_fraction == WARM.step_fraction
+    assert found.evidence.experiment is TAKEOFF
+    assert found.evidence.definition.step_fraction == WARM.step_fraction
     assert found.sentence.startswith("Nothing is used from the other vehicle: ")
     plain = next_proposal(replace(WARM, start=Start(kind="given", gains=TUNED)), [first])
     warm = next_proposal(WARM, [first], donor())
@@ -86,7 +87,7 @@ def test_before_the_first_valid_flight_nothing_is_decided() -> None:
     flight = bowl.fly(1, 50, 50)
     aborted = Flight(number=1, gains=flight.gains, trajectory=flight.trajectory, error=None, outcome="aborted")
     found = transfer(evidence(WARM, bowl.QuadraticExperiment(), [aborted], donor=flight))
-    assert (found.agreement, found.sentence, found.step_fraction) == (None, "", WARM.step_fraction)
+    assert (found.agreement, found.sentence, found.evidence.definition.step_fraction) == (None, "", WARM.step_fraction)
 
 
 def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_explains() -> None:
@@ -111,8 +112,8 @@ def test_scatter_is_no_disagreement_and_the_opposite_is_none_of_an_agreement(
 @compiled_only
 def test_each_vehicle_is_modelled_under_the_parameters_that_it_flew_with() -> None:
     """The donor's slow filter explains how it differs; before the own first flight, the own vehicle has it too."""
-    steps = get_experiment("altitude-steps-ardupilot", {"steps": 2, "step_window_s": 3.0}).modelled
-    assert steps is not None
+    steps = get_experiment("altitude-steps-ardupilot", {"steps": 2, "step_window_s": 3.0})
+    assert isinstance(steps, ModelledExperiment)
     slow = {"PSC_ACCZ_FLTE": 2.0, "telemetry_hz": 50.0}
     gains = steps.space.mapping(steps.space.default)
     record = steps.under(slow).simulate(steps.space.default, steps.nominal_model)

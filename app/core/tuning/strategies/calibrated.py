@@ -77,10 +77,10 @@ def trust_fraction(flights: Sequence[Flight]) -> float:
     for flight in flights:
         if flight.outcome == "aborted":
             fraction *= _SHRINK if flight.against_gains else 1.0
-        elif is_calibrated and flight.error is not None and (predicted := flight.predicted) is not None:
-            if predicted.upper is not None and flight.error > predicted.upper:
+        elif is_calibrated and flight.error is not None and flight.predicted and flight.predicted.interval:
+            if flight.error > flight.predicted.interval.upper:
                 fraction *= _SHRINK
-            elif predicted.lower is not None and flight.error >= predicted.lower:
+            elif flight.error in flight.predicted.interval:
                 fraction = min(fraction * _GROW, 1.0)
         is_calibrated = is_calibrated or flight.outcome == "valid"
     return fraction

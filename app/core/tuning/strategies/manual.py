@@ -5,7 +5,7 @@ from typing import Final
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import format_gains, short
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias
-from app.core.tuning.evidence import Evidence
+from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.strategy import Explanation, Proposal, Strategy, proposal_of
 
 
@@ -14,9 +14,9 @@ def propose(evidence: Evidence[Experiment]) -> Proposal:
 
     Without a model nothing is predicted. At least one flight must be valid.
     """
-    best, space, modelled = evidence.best, evidence.space, evidence.experiment.modelled
+    best, space = evidence.best, evidence.space
     gains = space.nearest(space.vector(best.gains))
-    predicted = None if modelled is None else correct_by_bias(modelled, best).predict(gains)
+    predicted = corrected_model(evidence).predict(gains) if has_model(evidence) else None
     summary = (
         f"This strategy proposes no step. The best gains so far are those of flight {best.number} "
         f"({format_gains(best.gains)}), error {short(best.error)} {evidence.experiment.error_unit}."

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.autopilots.registry import EXPERIMENTS
-from app.core.definition import Definition, Flight, Prediction, StopRule
+from app.core.definition import Definition, Flight, Interval, Prediction, StopRule
 from app.core.formatting import short
 from app.core.policy import Box
 from app.core.records.trajectory import Trajectory
@@ -117,7 +117,10 @@ def test_the_trust_region_bounds_the_step_after_an_abort_and_after_a_prediction_
     assert careful.explanation.summary.endswith(
         "Flight 2 counted against the gains and halved the largest allowed step: now 50\u00a0% of each gain's range."
     )
-    missed = replace(fly(2, {"kp": 290, "ki": 15, "kd": 82}), predicted=Prediction(error=0.1, lower=0.09, upper=0.11))
+    missed = replace(
+        fly(2, {"kp": 290, "ki": 15, "kd": 82}),
+        predicted=Prediction(error=0.1, interval=Interval(lower=0.09, upper=0.11)),
+    )
     after = next_proposal(CALM, [first, missed])
     assert after.explanation.trust_fraction == 0.5
     assert max(SPACE.change(after.gains, missed.gains).values()) <= 0.5
@@ -131,7 +134,7 @@ def test_gains_that_were_aborted_are_not_proposed_again() -> None:
     proposal = propose(evidence(CALM, TAKEOFF, [first], space))
     assert proposal.kind == "step"
     aborted = replace(fly(2, proposal.gains), outcome="aborted", error=None)
-    held = replace(fly(3, first.gains), predicted=Prediction(error=0.5, lower=0.0, upper=1.0))
+    held = replace(fly(3, first.gains), predicted=Prediction(error=0.5, interval=Interval(lower=0.0, upper=1.0)))
     again = propose(evidence(CALM, TAKEOFF, [first, aborted, held], space))
     assert again.explanation.trust_fraction == 1.0
     assert again.kind == "shorter step"
@@ -166,7 +169,7 @@ def test_a_step_of_one_count_that_was_aborted_leaves_nothing_to_halve() -> None:
     first = fly(1, {"kp": 283, "ki": 0, "kd": 82})
     assert propose(evidence(CALM, TAKEOFF, [first], space)).gains["ki"] == 1
     aborted = replace(fly(2, {"kp": 283, "ki": 1, "kd": 82}), outcome="aborted", error=None)
-    held = replace(fly(3, first.gains), predicted=Prediction(error=0.5, lower=0.0, upper=1.0))
+    held = replace(fly(3, first.gains), predicted=Prediction(error=0.5, interval=Interval(lower=0.0, upper=1.0)))
     assert propose(evidence(CALM, TAKEOFF, [first, aborted, held], space)).kind == "none"
 
 

@@ -3,7 +3,7 @@ from typing import Literal
 
 import pytest
 
-from app.core.definition import Flight, Prediction
+from app.core.definition import Flight, Interval, Prediction
 from app.core.tuning.strategies.calibrated import trust_fraction
 from tests.core.tuning.bowl import fly
 
@@ -15,7 +15,10 @@ def flown(number: int, outcome: Came) -> Flight:
     flight = fly(number, 30.0, 40)
     assert flight.error is not None
     factor = {"held": 1.0, "missed": 0.5, "better": 2.0, "aborted": 1.0, "cautious": 1.0, "untold": 1.0}[outcome]
-    told = Prediction(error=factor * flight.error, lower=0.9 * factor * flight.error, upper=1.1 * factor * flight.error)
+    told = Prediction(
+        error=factor * flight.error,
+        interval=Interval(lower=0.9 * factor * flight.error, upper=1.1 * factor * flight.error),
+    )
     if outcome in {"aborted", "cautious"}:
         against = outcome == "aborted"
         return replace(flight, outcome="aborted", error=None, predicted=told, against_gains=against)
