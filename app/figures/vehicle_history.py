@@ -1,4 +1,4 @@
-"""Wear of a vehicle over its flights: its fitted parameters, one small panel each, with their 95 % intervals; and the
+"""History of a vehicle over its flights: its fitted parameters, one small panel each, with their 95 % intervals, and the
 voltage before and after each flight, by battery.
 """
 
