@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, status
 
 from app.accounts.permissions import Permission, is_allowed
-from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, wear
+from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, vehicle_history
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -20,7 +20,7 @@ from app.campaigns.schemas import (
     Sort,
 )
 from app.campaigns.statistics import CampaignStatistics, campaign_statistics
-from app.campaigns.wear import VehicleCalibration
+from app.campaigns.vehicle_history import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import Page
 from app.common.states import CampaignState
@@ -230,7 +230,7 @@ vehicles_router = APIRouter(prefix="/api/vehicles", tags=["vehicles"])
 def get_calibration(session: Reader, vehicle_id: Id) -> VehicleCalibration:
     """The model as fitted after each flight, over all campaigns of the vehicle, and whether it should be tuned
     again."""
-    return wear.calibration_of(session, vehicle_id)
+    return vehicle_history.calibration_of(session, vehicle_id)
 
 
 @vehicles_router.get("/{vehicle_id}/figures/{name}")
@@ -238,7 +238,7 @@ def get_vehicle_figure(
     session: Reader, vehicle_id: Id, name: Literal["calibration", "batteries"], theme: Theme = "light"
 ) -> Card:
     """The fitted parameters over the vehicle's flights, or the battery voltages before and after each flight."""
-    return wear.vehicle_figure(session, vehicle_id, name, theme)
+    return vehicle_history.vehicle_figure(session, vehicle_id, name, theme)
 
 
 @vehicles_router.patch("/{vehicle_id}", dependencies=[Depends(json_only)])

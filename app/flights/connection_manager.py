@@ -20,7 +20,6 @@ from app.common.states import GIVES_GAINS, ActKind
 from app.fleet import commands
 from app.fleet.commands import ActTask
 from app.flights.connection_process import run_connection_process
-from app.flights.flight_commands import record_abort
 from app.flights.flight_process import RECONNECT_INTERVAL_S, VehicleConnection
 from app.flights.process_messages import (
     CommandForwarded,
@@ -29,6 +28,7 @@ from app.flights.process_messages import (
     VehicleResponse,
     status_time,
 )
+from app.flights.service import record_abort
 from app.flights.worker_part import WorkerPart
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError

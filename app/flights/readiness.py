@@ -199,27 +199,17 @@ class TrialReadiness(Schema):
     is_ready: Annotated[bool, Field(description="whether the takeoff of the staged vehicle may be requested")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Readiness:
-    """Steps that hold, steps that were reached and are lost, each in order, and why."""
-
-    steps: Steps
-    lost: Steps
-    losses: tuple[Loss, ...]
-
-
 def readiness_of(standing: Standing, report: VehicleReport) -> TrialReadiness:
     """Evaluate how far a flight has come and which of it still holds, for who asks: control is no step of theirs while
     another operator has it."""
-    found = _readiness_of(standing, report)
-    steps, lost = found.steps, found.lost
+    steps, lost, losses = _readiness_of(standing, report)
     if standing.is_controlled_by_other:
         steps, lost = (tuple(step for step in each if step != "control") for each in (steps, lost))
-    is_ready = steps[-1:] == ("staged",) and not found.losses
-    return TrialReadiness(steps=steps, lost=lost, losses=found.losses, is_ready=is_ready)
+    return TrialReadiness(steps=steps, lost=lost, losses=losses, is_ready=steps[-1:] == ("staged",) and not losses)
 
 
-def _readiness_of(standing: Standing, report: VehicleReport) -> _Readiness:
+def _readiness_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Steps, tuple[Loss, ...]]:
+    """Steps that hold, steps that were reached and are lost, each in order, and why."""
     reached = _REACHED[standing.trial]
     if standing.trial is TrialState.STAGED and standing.standing_down:
         reached = "control"
@@ -229,23 +219,23 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> _Readiness:
         reached = "landed"
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
     if standing.trial is TrialState.LOST or standing.was_lost_in_flight:  # whether it has landed is not known
-        return _Readiness(steps=STEPS[: _IN_FLIGHT + 1], lost=("landed",), losses=())
+        return STEPS[: _IN_FLIGHT + 1], ("landed",), ()
     if standing.has_not_landed and "landed" in steps:
-        return _Readiness(steps=tuple(step for step in steps if step != "landed"), lost=("landed",), losses=())
+        return tuple(step for step in steps if step != "landed"), ("landed",), ()
     if len(steps) > _IN_FLIGHT + 1 or not steps:
-        return _Readiness(steps=steps, lost=(), losses=())
+        return steps, (), ()
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        steps = STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1]
-        return _Readiness(steps=steps, lost=(), losses=_in_flight(kinds, texts))
+        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), _in_flight(kinds, texts)
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
-    kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))
+    keeps = [texts[kind].keeps for kind in kinds]
+    kept = min((0 if step is None else STEPS.index(step) + 1 for step in keeps), default=len(steps))
     losses = tuple(
         Loss(kind=kind, what=_what(kind, texts, standing), way_on=_way_on(texts[kind], standing)) for kind in kinds
     )
-    return _Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
+    return steps[:kept], steps[kept:], losses
 
 
 def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessStep:
@@ -319,7 +309,3 @@ def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tup
         for kind in kinds
         if texts[kind].what_in_flight
     )
-
-
-def _count(kept: ReadinessStep | None) -> int:
-    return 0 if kept is None else STEPS.index(kept) + 1

@@ -30,15 +30,15 @@ from app.fleet.control import (
     control_of,
     is_in_control,
     may_command,
+    record_act,
     require_control,
     require_may_command,
     require_not_controlled_by_other,
 )
 from app.flights import flight_rows
-from app.flights.flight_commands import record_abort, record_flight_command
 from app.flights.readiness import Standing, TrialReadiness, readiness_of, require_ready
 from app.live.hub import VehicleReport
-from app.vehicles.flight_end import Landing, Requester, StopRequest, unstaged_text, withdrawn_by
+from app.vehicles.flight_end import Landing, Requester, StopRequest, request_text, unstaged_text, withdrawn_by
 
 ReportOf = Callable[[int], VehicleReport]
 """What is known of a vehicle at this moment, by its id."""
@@ -99,7 +99,7 @@ def _request_flight(
     fleet.require_ready(session, vehicle, mode)
     by = require_not_controlled_by_other(vehicle, context)
     flight = flight_rows.add_flight(session, row.id, mode=mode, speed=speed)
-    record_flight_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
+    _record_command(session, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
@@ -162,7 +162,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
         by = require_not_controlled_by_other(vehicle, context)
     require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
-    record_flight_command(session, flight, ActKind.TAKE_OFF, by=by)
+    _record_command(session, flight, ActKind.TAKE_OFF, by=by)
     return trial_view(session, row)
 
 
@@ -179,7 +179,7 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     flight.stand_down = requester
     operator = control_of(flight.vehicle) if is_in_control(flight.vehicle, context) else None
     by = "" if operator is None else operator.operator
-    record_flight_command(session, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester))
+    _record_command(session, flight, ActKind.UNSTAGE, by=by, reason="" if by else unstaged_text(requester))
     return trial_view(session, row)
 
 
@@ -226,3 +226,25 @@ def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
         f"Flight {row.number} is {row.state}: there is no flight to abort.",
         hint="Reload the trial.",
     )
+
+
+def _record_command(session: Session, flight: FlightRow, kind: ActKind, *, by: str, reason: str = "") -> None:
+    """Record a command to the vehicle of a flight, which has its outcome; `by` is the operator in control, empty if the
+    request came from elsewhere. Shared simulations have no log."""
+    if flight.vehicle.registered:
+        named = f"flight {flight.trial.number} of {flight.campaign.name}"
+        record_act(
+            session,
+            flight.vehicle,
+            kind,
+            by=by,
+            reason=f"{named}: {reason}" if reason else named,
+            result={"flight_id": flight.id},
+        )
+
+
+def record_abort(session: Session, trial_id: int, request: StopRequest) -> None:
+    """Record an abort, which everyone may request. Raises NotFoundError."""
+    history.trial_row(session, trial_id)
+    if (flight := history.latest_flights(session, [trial_id]).get(trial_id)) is not None:
+        _record_command(session, flight, ActKind.ABORT, by="", reason=request_text(request))

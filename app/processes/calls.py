@@ -159,23 +159,15 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
             hint="Send this file again in a few seconds; nothing was stored.",
         )
     try:
-        return _run_limited(limits, partial(function, *args, **kwargs))
+        with ChildProcess(_perform, limits, partial(function, *args, **kwargs), name="reading") as child:
+            if not child.pipe.poll(limits.wall_s):
+                raise _too_much(limits)
+            outcome: T | TaskError = child.receive()
+        return result_of(outcome)
+    except (ProcessDiedError, MemoryError) as error:  # its processor time was used up, or there was no more memory
+        raise _too_much(limits) from error
     finally:
         _places.release()
-
-
-def _run_limited(limits: Limits, task: Callable[[], T]) -> T:
-    with ChildProcess(_perform, limits, task, name="reading") as child:
-        if not child.pipe.poll(limits.wall_s):
-            raise _too_much(limits)
-        try:
-            outcome: T | TaskError = child.receive()
-        except ProcessDiedError as error:  # the processor time was used up, or the system ran out of memory
-            raise _too_much(limits) from error
-    try:
-        return result_of(outcome)
-    except MemoryError as error:
-        raise _too_much(limits) from error
 
 
 def _perform(pipe: Connection, limits: Limits, task: Callable[[], object]) -> None:

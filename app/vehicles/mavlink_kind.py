@@ -160,6 +160,11 @@ def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
     return ()
 
 
+def _plan_option(name: str, title: str, default: float, unit: str, lower: float, upper: float) -> Option:
+    """A setting of vehicles that fly by a flight plan on board."""
+    return Option(name, f"{_titles(_PLANNED)}{title}", default, unit, lower, upper, autopilots=_names(_PLANNED))
+
+
 MAVLINK: Final = VehicleKind(
     name="mavlink",
     title="Vehicle over MAVLink",
@@ -178,45 +183,13 @@ MAVLINK: Final = VehicleKind(
         ),
         Option("simulated", "Simulated vehicle on this computer", False),
         Option("system_id", "MAVLink system id; 0: the first autopilot received", 0.0, "", 0.0, 255.0),
-        Option(
-            "aircraft_id",
-            f"{_titles(_PLANNED)}'s aircraft id (AC_ID); 0: the same as the system id",
-            0.0,
-            "",
-            0.0,
-            255.0,
-            autopilots=_names(_PLANNED),
-        ),
+        _plan_option("aircraft_id", "'s aircraft id (AC_ID); 0: the same as the system id", 0.0, "", 0.0, 255.0),
         Option("telemetry_hz", "Requested rate of positions", 50.0, "Hz", 40.0, 200.0),
-        Option(
-            "climb_waypoint",
-            f"{_titles(_PLANNED)}: number of the waypoint that the takeoff climbs to",
-            2.0,
-            "",
-            1.0,
-            254.0,
-            autopilots=_names(_PLANNED),
-        ),
+        _plan_option("climb_waypoint", ": number of the waypoint that the takeoff climbs to", 2.0, "", 1.0, 254.0),
         Option("min_battery_v", "Lowest battery voltage to fly with", 10.5, "V", 0.0, 60.0),
         Option("radius_m", "Maximum distance from the start", 5.0, "m", 0.5, 100.0),
-        Option(
-            "plan_radius_m",
-            f"{_titles(_PLANNED)}: maximum distance from HOME in the flight plan",
-            8.0,
-            "m",
-            0.5,
-            1000.0,
-            autopilots=_names(_PLANNED),
-        ),
-        Option(
-            "plan_time_s",
-            f"{_titles(_PLANNED)}: time limit of the flight plan's takeoff",
-            45.0,
-            "s",
-            15.0,
-            600.0,
-            autopilots=_names(_PLANNED),
-        ),
+        _plan_option("plan_radius_m", ": maximum distance from HOME in the flight plan", 8.0, "m", 0.5, 1000.0),
+        _plan_option("plan_time_s", ": time limit of the flight plan's takeoff", 45.0, "s", 15.0, 600.0),
         Option("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", 1.0, "×", 0.1, 100.0),
         Option(
             "second_source",

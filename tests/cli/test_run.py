@@ -15,8 +15,10 @@ from app.campaigns.campaign_files import preset_names
 from app.campaigns.trials import records
 from app.cli.commands import app
 from app.core.experiments.base import Experiment
+from app.core.policy import Gains
 from app.core.records.glitches import Glitch
 from app.core.records.trajectory import Trajectory
+from app.vehicles.simulated import StagedVehicle
 
 RUN_ON_TWIN = ("run", "ardrone-takeoff", "--vehicle", "twin", "--set", "scatter=0")
 
@@ -131,6 +133,21 @@ def test_a_refused_start_flies_with_a_reason_that_the_result_keeps(tmp_path: Pat
     campaign = flown(tmp_path, *undamped, "--overrule", "to see it swing")
     assert [trial["overrule_reason"] for trial in campaign["trials"]] == ["to see it swing"]
     assert errors(campaign)[0] > 0.3
+
+
+def test_gains_that_the_vehicle_does_not_hold_are_not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
+    staged, asked = StagedVehicle.stage, list[Gains]()
+
+    def forget_once(vehicle: StagedVehicle, gains: Gains) -> dict[str, float]:
+        asked.append(gains)
+        return staged(vehicle, gains) | ({"kp": 1.0} if len(asked) == 1 else {})
+
+    monkeypatch.setattr(StagedVehicle, "stage", forget_once)
+    result = gainline(*RUN_ON_TWIN, "--max-flights", "1")
+    assert result.exit_code == 1
+    said = "Flight 1: The vehicle did not accept the gains: kp is 1 instead of 283. It was not flown."
+    assert said in " ".join(result.stderr.split())
+    assert len(asked) == 2, "the safe gains are restored"
 
 
 SPIKE = Glitch(kind="acceleration", start_s=1.0, end_s=1.1, sentence="The altitude jumps.")

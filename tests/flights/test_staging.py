@@ -18,8 +18,8 @@ from app.db.models import FlightRow
 from app.db.session import Database
 from app.fleet import commands
 from app.flights import flight_rows
-from app.flights.flight_commands import record_abort
 from app.flights.flight_rows import FlightOutcome
+from app.flights.service import record_abort
 from app.live.link import LiveServer
 from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
 from app.main import create_app

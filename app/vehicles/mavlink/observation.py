@@ -24,8 +24,7 @@ from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Finding
 from app.vehicles.mavlink.monitors.altitude import PositionMonitor, SecondSourceMonitor
 from app.vehicles.mavlink.monitors.clock import ATTENDED_S, ClockMonitor, unwrapped
 from app.vehicles.mavlink.monitors.ground import AGREED_S, STANDS_S, ClimbMonitor, GroundMonitor
-from app.vehicles.mavlink.monitors.limits import BatteryMonitor, EnvelopeMonitor
-from app.vehicles.mavlink.monitors.link import LinkMonitor
+from app.vehicles.mavlink.monitors.limits import BatteryMonitor, EnvelopeMonitor, LinkMonitor
 from app.vehicles.mavlink.monitors.modes import IdentityMonitor, ModeMonitor
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace

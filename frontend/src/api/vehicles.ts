@@ -47,14 +47,14 @@ export function useVehicleChanged() {
 
 export function useCalibration(vehicleId: number) {
   return useQuery({
-    queryKey: ["wear", vehicleId, "calibration"],
+    queryKey: ["history", vehicleId, "calibration"],
     queryFn: () => answer(getCalibration({ path: { vehicle_id: vehicleId } })),
   });
 }
 
 export function useVehicleFigure(vehicleId: number, name: "calibration" | "batteries", theme: Theme) {
   return useQuery({
-    queryKey: ["wear", vehicleId, name, theme],
+    queryKey: ["history", vehicleId, name, theme],
     queryFn: () => answer(getVehicleFigure({ path: { vehicle_id: vehicleId, name }, query: { theme } })),
     placeholderData: keepPreviousData,
   });

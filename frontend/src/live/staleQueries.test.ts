@@ -7,7 +7,7 @@ test("a changed trial makes its campaign, the lists and what flies doubtful", ()
     ["flying"],
     ["campaigns"],
     ["trial", 9],
-    ["wear"],
+    ["history"],
     ["campaign", 4],
   ]);
 });
@@ -19,13 +19,13 @@ test("a changed job makes the jobs doubtful, and one without a campaign the repr
 
 test("a changed vehicle makes itself and the list of vehicles doubtful", () => {
   const keys = staleQueries([{ topic: "vehicle", entity_id: 2, campaign_id: null }]);
-  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2], ["campaigns"], ["wear"]]);
+  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2], ["campaigns"], ["history"]]);
 });
 
-test("new gains and a flight make doubtful what is known of the vehicles' wear", () => {
-  expect(staleQueries([{ topic: "proposal", entity_id: 7, campaign_id: 4 }])).toContainEqual(["wear"]);
-  expect(staleQueries([{ topic: "flight", entity_id: 7, campaign_id: 4 }])).toContainEqual(["wear"]);
-  expect(staleQueries([{ topic: "job", entity_id: 7, campaign_id: 4 }])).not.toContainEqual(["wear"]);
+test("new gains and a flight make doubtful what is known of the vehicles' history", () => {
+  expect(staleQueries([{ topic: "proposal", entity_id: 7, campaign_id: 4 }])).toContainEqual(["history"]);
+  expect(staleQueries([{ topic: "flight", entity_id: 7, campaign_id: 4 }])).toContainEqual(["history"]);
+  expect(staleQueries([{ topic: "job", entity_id: 7, campaign_id: 4 }])).not.toContainEqual(["history"]);
 });
 
 test("many changes together ask for each answer once", () => {
@@ -34,7 +34,7 @@ test("many changes together ask for each answer once", () => {
     { topic: "campaign", entity_id: 4, campaign_id: 4 },
     { topic: "campaign", entity_id: 4, campaign_id: 4 },
   ];
-  expect(staleQueries(changes)).toEqual([["flying"], ["wear"], ["campaign", 4], ["campaigns"]]);
+  expect(staleQueries(changes)).toEqual([["flying"], ["history"], ["campaign", 4], ["campaigns"]]);
 });
 
 test("a line that is no change is left alone", () => {

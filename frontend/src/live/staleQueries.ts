@@ -49,7 +49,7 @@ function keysOf(change: Change): QueryKey[] {
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
   if (change.topic === "trial") keys.push(["trial", change.entity_id]);
   if (change.topic === "vehicle") keys.push(["vehicles"], ["vehicle", change.entity_id], ["campaigns"]);
-  if (TELLING.has(change.topic)) keys.push(["wear"]);
+  if (TELLING.has(change.topic)) keys.push(["history"]);
   if (change.topic === "job" && change.campaign_id === null) keys.push(["reproductions"]);
   if (change.campaign_id !== null) keys.push(["campaign", change.campaign_id]);
   return keys;

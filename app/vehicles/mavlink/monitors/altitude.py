@@ -12,7 +12,7 @@ from app.autopilots.measurements import Position
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Failure, Finding
 from app.vehicles.mavlink.monitors.clock import ATTENDED_S, FRESH_S, LOST_S, STUCK_S
-from app.vehicles.mavlink.monitors.link import SILENT_S
+from app.vehicles.mavlink.monitors.limits import SILENT_S
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace, since
 

@@ -1,4 +1,4 @@
-"""Limits of a flight: altitude, speed, place, oscillation and lean, the vehicle's own fence, and its battery."""
+"""Limits of a flight: the link, altitude, speed, place, oscillation and lean, the vehicle's own fence, its battery."""
 
 import math
 from dataclasses import dataclass
@@ -6,10 +6,11 @@ from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
-from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.states import replace, since
 
+SILENT_S: Final = 1.0
 _CLIMB_RATE_M_S: Final = 4.0
 _CROSSING_M: Final = 0.3
 _CROSSINGS: Final = 4
@@ -20,6 +21,22 @@ _LONGEST_LEAN_S: Final = 0.5
 _LEANING: Final = 0.5
 _LOW_VOLTAGE_S: Final = 1.0
 _UNKNOWN_VOLTAGE_S: Final = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkMonitor:
+    """`received_s` is the time of the last packet."""
+
+    received_s: float
+
+    def find(self, plan: Plan, heartbeat_s: float, now_s: float) -> Finding | None:
+        """Find a lost link; `heartbeat_s` is the time of the last heartbeat."""
+        silent_s = SILENT_S * plan.timeout_factor
+        if now_s - self.received_s > silent_s:
+            return Finding(Failure.LINK, f"Nothing was received for more than {silent_s:g} s.")
+        if now_s - heartbeat_s > HEARTBEATS_MISSED * plan.heartbeat_s:
+            return Finding(Failure.LINK, "Three heartbeats were missed.")
+        return None
 
 
 @dataclass(frozen=True, kw_only=True)

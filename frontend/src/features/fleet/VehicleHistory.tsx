@@ -17,8 +17,20 @@ import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { ACTS, purposeOf } from "./fleet";
 
+/** What is known of the vehicle over all its campaigns: its calibrations and batteries, the gains written to it, and, of
+ * a registered one, what people asked of it. */
+export function VehicleHistory({ vehicle }: { vehicle: Pick<Vehicle, "id" | "registered" | "safe_gains"> }) {
+  return (
+    <>
+      <CalibrationHistory vehicleId={vehicle.id} />
+      <LedgerTable vehicle={vehicle} />
+      {vehicle.registered && <RequestList vehicleId={vehicle.id} />}
+    </>
+  );
+}
+
 /** All gain sets written to the vehicle, and the values read back. */
-export function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> }) {
+function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> }) {
   const ledger = useLedger(vehicle.id);
   const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
   const names = Object.keys(vehicle.safe_gains);
@@ -84,7 +96,7 @@ function Line({ line, names }: { line: GivenGains; names: readonly string[] }) {
 const OF_FLIGHTS: ReadonlySet<string> = new Set(["stage", "take-off", "unstage", "abort"]);
 
 /** What people asked of the vehicle: who, when, outcome. */
-export function RequestList({ vehicleId }: { vehicleId: number }) {
+function RequestList({ vehicleId }: { vehicleId: number }) {
   const acts = useActs(vehicleId);
   const items = acts.data?.pages.flatMap((page) => page.items) ?? [];
   return (
@@ -131,7 +143,7 @@ const EMPTY_PX = 96;
 const heightOf = (card: FigureCard | undefined, ready: number) => (card?.state === "ready" ? ready : EMPTY_PX);
 
 /** Fitted parameters of the vehicle over its flights, whether they changed, and its batteries. */
-export function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
+function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
   const theme = useComputedColorScheme("light");
   const known = useCalibration(vehicleId);
   const calibration = useVehicleFigure(vehicleId, "calibration", theme);

@@ -17,7 +17,7 @@ import { BatteryPanel, LinkPanel } from "./LinkPanel";
 import { OperatorControl } from "./OperatorControl";
 import { QuarantinePanel } from "./QuarantinePanel";
 import { SafeGains } from "./SafeGains";
-import { CalibrationHistory, LedgerTable, RequestList } from "./VehicleHistory";
+import { VehicleHistory } from "./VehicleHistory";
 import { CheckList, ParameterPanel } from "./VehicleReadings";
 import { VehicleStateBadge } from "./VehicleStateBadge";
 
@@ -49,8 +49,7 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
       </Group>
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
-        <CalibrationHistory vehicleId={vehicle.id} />
-        <LedgerTable vehicle={vehicle} />
+        <VehicleHistory vehicle={vehicle} />
       </SimpleGrid>
     </>
   );
@@ -135,9 +134,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
         >
           <CheckList vehicle={vehicle} />
         </Panel>
-        <CalibrationHistory vehicleId={vehicle.id} />
-        <LedgerTable vehicle={vehicle} />
-        <RequestList vehicleId={vehicle.id} />
+        <VehicleHistory vehicle={vehicle} />
         <ParameterPanel
           vehicleId={vehicle.id}
           mayRead={may("parameters")}

@@ -1,4 +1,5 @@
-"""Condition of a vehicle over all its campaigns: its calibrations over its flights, and its batteries."""
+"""History of a vehicle over all its campaigns: its calibrations over its flights, whether they show wear, and its
+batteries. The gains written to it and what was asked of it are in `fleet.views`."""
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -13,7 +14,7 @@ from app.core.statistics.drift import MONITORED_PARAMETERS, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.theme import ThemeName
-from app.figures.vehicle_wear import BatteriesFigure, CalibrationFigure, Point
+from app.figures.vehicle_history import BatteriesFigure, CalibrationFigure, Point
 from app.fleet import service as fleet
 
 _STRATEGY: Final = "calibrated"
