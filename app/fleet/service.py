@@ -20,9 +20,7 @@ from app.core.policy import Gains
 from app.db.base import added, utc_now
 from app.db.models import CampaignRow, VehicleRow
 from app.db.pages import Order, page_of
-from app.db.types import utc_now
 from app.figures.vehicle_history import BatteryFlight
-from app.figures.vehicle_wear import BatteryFlight
 from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.schemas import CampaignVehicle, Vehicle, VehicleChoice
