@@ -1,6 +1,6 @@
 """How well the replica of an autopilot's loop explains a log, for a person: its facts, table, notes and figures."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -37,7 +37,12 @@ def answer_of(check: ReplicaCheck) -> ReplicaAnswer:
 
 def plots_of(check: ReplicaCheck, replica: LoopReplica) -> list[Plot]:
     """Recording and replica overlaid, one panel for each signal, as far as they were compared."""
-    panels = {name: panel for overlay in check.overlays for name, panel in _panels(overlay, replica)}
+    panels = {
+        name: _panel(name, replica.signals[name], overlay)
+        for overlay in check.overlays
+        if len(overlay.time_s)
+        for name in overlay.recorded
+    }
     plots = []
     for title, names in replica.figures:
         drawn = [name for name in names if name in panels]
@@ -90,12 +95,6 @@ def _brief(value: float) -> str:
     if value >= _IN_FULL:
         return np.format_float_positional(value, 2, fractional=False, trim="-")
     return f"{value:.2g}".replace("e-0", "e-")
-
-
-def _panels(overlay: Overlay, replica: LoopReplica) -> Iterator[tuple[str, Panel]]:
-    for name in overlay.recorded:
-        if len(overlay.time_s):
-            yield name, _panel(name, replica.signals[name], overlay)
 
 
 def _panel(name: str, signal: Signal, overlay: Overlay) -> Panel:

@@ -37,7 +37,6 @@ class SimulationCheck:
 
     command_s: float
     duration_s: float
-    rows: int
     largest_difference: Mapping[str, float]
     overlay: Overlay
 
@@ -74,7 +73,6 @@ def compare_simulation(log: LoopLog) -> SimulationCheck | None:
     return SimulationCheck(
         command_s=float(part.time_s[0]) + offset_s,
         duration_s=float(part.time_s[-1] - part.time_s[0]),
-        rows=len(part) - 1,
         largest_difference={name: float(values.max()) for name, values in outside.items()},
         overlay=overlay,
     )
