@@ -23,7 +23,6 @@ from app.campaigns.trials import router as trials
 from app.common.errors import NotFoundError
 from app.common.settings import Settings
 from app.compare.router import router as compare
-from app.controller_checks import router as controller_checks
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.fleet.router import router as fleet
@@ -84,8 +83,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         fleet,
         jobs,
         reproductions,
-        controller_checks.router,
-        controller_checks.recordings,
         log_analyses,
         compare,
         reports,

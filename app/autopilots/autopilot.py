@@ -176,10 +176,6 @@ class Autopilot:
     """Usual address of a vehicle."""
     simulated_address: str = "udpin:127.0.0.1:14550"
     """Usual address of a simulated one."""
-    recordings: str
-    """What the controller check takes of it."""
-    recording_types: tuple[str, ...] = ()
-    """File types of these."""
     sends_to_port: bool = False
     """Whether it sends to a fixed port of this computer, which an address over UDP must name."""
     heartbeat_s: float = 1.0

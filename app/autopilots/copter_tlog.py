@@ -4,16 +4,19 @@ It takes the same of them as our own link records: position, demanded throttle a
 flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter's reference is shaped again from these.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Final, Self
 
 import numpy as np
 
-from app.autopilots.ardupilot.experiments import ardupilot_loop, read_ardupilot
-from app.autopilots.ardupilot.replica.parameters import NEWER_NAMES, in_newer_names, in_older_names
-from app.autopilots.copter_autopilots import AUTOPILOTS, IN_TAKEOFFS, CopterAutopilot
-from app.autopilots.px4.experiments import px4_loop, read_px4
+from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop, read_ardupilot
+from app.autopilots.ardupilot.log import MODES
+from app.autopilots.ardupilot.replica import parameters as ardupilot
+from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
+from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
+from app.autopilots.px4.replica import parameters as px4
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording, Rows, held
 from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, Part, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
@@ -37,6 +40,88 @@ _SAME_TARGET_M: Final = 0.01
 _AT_REST_M: Final = 0.05
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Autopilot:
+    """What differs between ArduCopter and PX4.
+
+    `number_of_mode` is of the custom mode in a heartbeat; `mode` is the one whose set points the vehicle reports.
+    `messages` are needed. Of the parameters, the gains in `bounds` are needed, and `learned` if there is one, which the
+    vehicle changes by itself; `kept` are all on which the loop depends, `usual` those that every release has.
+    `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
+    """
+
+    number_of_mode: Callable[[int], int]
+    mode: int
+    modes: Mapping[float, str]
+    messages: Sequence[str]
+    bounds: Mapping[str, tuple[float, float]]
+    kept: Sequence[str]
+    usual: Sequence[str]
+    learned: str
+    shapes_reference: bool
+    hint: str
+
+    def mode_name(self, mode: int) -> str:
+        """As its users call it."""
+        return self.modes.get(mode, f"mode {mode}")
+
+
+_ASK: Final = (
+    "Use a telemetry log of altitude steps in {mode}: hover for 5 s, climb 2 m, hover for 5 s, descend 2 m, hover for "
+    "5 s. Before it read all parameters, and ask the vehicle for 50 of each of these messages a second: "
+    "MAV_CMD_SET_MESSAGE_INTERVAL with 20000 µs for {messages}{or_else}. The vehicle's own log ({own}) needs none of "
+    "this."
+)
+_IN_TAKEOFFS: Final = frozenset(
+    {"TKOFF_SLEW_TIME", "TKOFF_THR_MAX", "MPC_TKO_RAMP_T", "COM_SPOOLUP_TIME", "MPC_LAND_SPEED"}
+)
+"""Parameters that act in takeoffs and landings alone."""
+
+
+_AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
+    {
+        "ardupilot": _Autopilot(
+            number_of_mode=lambda mode: mode,
+            mode=4,
+            modes=MODES,
+            messages=("LOCAL_POSITION_NED", "NAV_CONTROLLER_OUTPUT", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
+            bounds=ArduPilotLoop.space.bounds,
+            learned="MOT_THST_HOVER",
+            kept=ardupilot.LOOP_NAMES,
+            usual=(
+                *ardupilot.DEFAULTS,
+                ardupilot.ACCELEROMETER_FILTER,
+                ardupilot.LOOP_RATE,
+            ),
+            shapes_reference=True,
+            hint=_ASK.format(
+                mode="GUIDED",
+                messages="32, 62, 83 and 85",
+                or_else=" (in MAVProxy: long SET_MESSAGE_INTERVAL 32 20000)",
+                own=".bin",
+            ),
+        ),
+        "px4": _Autopilot(
+            number_of_mode=lambda mode: mode >> 16 & 0xFF,
+            mode=6,
+            modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
+            messages=("LOCAL_POSITION_NED", "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"),
+            bounds=Px4Loop.space.bounds,
+            learned="",
+            kept=px4.LOOP_NAMES,
+            usual=(*px4.DEFAULTS, *px4.ESTIMATOR_NAMES),
+            shapes_reference=False,
+            hint=_ASK.format(
+                mode="Offboard",
+                messages="32, 83 and 85",
+                or_else=" (in PX4's console: mavlink stream -s ATTITUDE_TARGET -r 50, with -d or -u for the link)",
+                own=".ulg",
+            ),
+        ),
+    }
+)
+
+
 def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
     """The part with the largest altitude changes, at most 120 s under the same parameters, of an ArduPilot or PX4; None
     of another autopilot.
@@ -44,7 +129,7 @@ def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
     Raises TrajectoryError naming every message, mode and parameter that is missing, or InputError for a parameter that
     is not supported.
     """
-    autopilot = AUTOPILOTS.get(recording.autopilot.name)
+    autopilot = _AUTOPILOTS.get(recording.autopilot.name)
     return None if autopilot is None else _Reader(name, recording, autopilot).read()
 
 
@@ -63,7 +148,7 @@ class _Rows:
     is_disarmed: Rows
 
     @classmethod
-    def of(cls, recording: Recording, autopilot: CopterAutopilot) -> Self:
+    def of(cls, recording: Recording, autopilot: _Autopilot) -> Self:
         """Those of a vehicle's reports, which has all that its autopilot needs."""
         columns = recording.columns
         time_s, altitude_m = columns["altitude_m"].time_s, columns["altitude_m"].values
@@ -117,7 +202,7 @@ class _Rows:
 class _Reader:
     name: str
     recording: Recording
-    autopilot: CopterAutopilot
+    autopilot: _Autopilot
 
     def read(self) -> LoggedFlight:
         if frame := self.recording.frame:
@@ -240,13 +325,13 @@ class _Reader:
 
     def _assumed(self, given: Parameters) -> tuple[str, ...]:
         """By the names of the vehicle's release."""
-        known = {*given, self.autopilot.learned, *IN_TAKEOFFS}
+        known = {*given, self.autopilot.learned, *_IN_TAKEOFFS}
         absent = [each for each in self.autopilot.usual if each not in known]
         return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
 
     @property
     def _has_newer_names(self) -> bool:
-        return any(each.name in NEWER_NAMES for each in self.recording.settings)
+        return any(each.name in ardupilot.NEWER_NAMES for each in self.recording.settings)
 
     @property
     def _mode(self) -> str:
@@ -259,7 +344,7 @@ class _Reader:
         return TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
 
 
-def _follows(recording: Recording, autopilot: CopterAutopilot, time_s: Samples) -> Rows:
+def _follows(recording: Recording, autopilot: _Autopilot, time_s: Samples) -> Rows:
     """Times, shape (n,), between two heartbeats with armed motors in the mode with set points, or after the last."""
     armed, modes = recording.columns["is_armed"], recording.columns["mode"]
     at_s, is_mode = armed.time_s, [autopilot.number_of_mode(int(mode)) == autopilot.mode for mode in modes.values]

@@ -101,8 +101,6 @@ class AutopilotInfo(Schema):
     experiments: list[str] = Field(description="those that tune its gains, the default first")
     address: str = Field(description="usual address of a vehicle")
     simulated_address: str = Field(description="usual address of a simulated one")
-    recordings: str = Field(description="what the controller check takes of it")
-    recording_types: list[str] = Field(description="file types of these")
 
 
 class PresetInfo(Schema):

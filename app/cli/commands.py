@@ -45,8 +45,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Tune a drone's controller gains in a few flights.",
 )
-controller = typer.Typer(no_args_is_help=True, help="Check the replica of the autopilot's vertical loop.")
-app.add_typer(controller, name="controller")
 
 
 @app.command()
@@ -260,9 +258,12 @@ def analyze(
         typer.Argument(
             metavar="LOG",
             help="ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data "
-            "(a .log next to it is read too) or .tlog of takeoffs.",
+            "(a .log next to it is read too) or .tlog of takeoffs; or a trace of the vertical loop, .csv or .csv.gz.",
         ),
     ],
+    gains: Annotated[
+        str, typer.Option(metavar="KP,KI,KD", help="Gains flown, for the replica, if no log contains them.")
+    ] = "",
     params: Annotated[
         Path | None,
         typer.Option(
@@ -274,10 +275,11 @@ def analyze(
     ] = None,
     json_out: JsonOut = None,
 ) -> None:
-    """Propose better altitude gains from a flight log, and print what the model predicts for them."""
+    """Propose better altitude gains from a flight log, and print what the model predicts for them; and say how well the
+    replica of the autopilot's vertical loop explains it."""
     from app.cli.files import analyze_log
 
-    analyze_log(log, json_out=json_out, params_out=params)
+    analyze_log(log, gains=gains, json_out=json_out, params_out=params)
 
 
 @app.command()
@@ -321,36 +323,6 @@ def unbundle(
     from app.cli.files import unbundle as run
 
     run(file, _settings(data_dir=data_dir))
-
-
-@controller.command()
-def replay(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE…", help="Recorded runs, .csv or .csv.gz; .bin logs of ArduCopter.")
-    ],
-    json_out: JsonOut = None,
-) -> None:
-    """Replay recorded runs through the replica of their autopilot; exit code 1 if one differs or cannot be read."""
-    from app.cli.reproduce import replay_files
-
-    if not replay_files(files, json_out):
-        raise typer.Exit(1)
-
-
-@controller.command()
-def check(
-    files: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE…", help="Paparazzi .data files with VERT_LOOP, each with its .log next to it."),
-    ],
-    gains: Annotated[str | None, typer.Option(metavar="KP,KI,KD", help="Gains flown, if no log contains them.")] = None,
-    json_out: JsonOut = None,
-) -> None:
-    """Compare flight logs of the vertical loop with the replica; exit code 1 if they differ or cannot be read."""
-    from app.cli.reproduce import check_files
-
-    if not check_files(files, gains, json_out):
-        raise typer.Exit(1)
 
 
 def _settings(**given: str | int | Path | None) -> "Settings":

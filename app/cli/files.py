@@ -3,7 +3,7 @@ out, and whole campaigns in and out.
 """
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Final, Literal
@@ -25,7 +25,7 @@ from app.common.settings import Settings
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.log_analyses.schemas import LogAnswer
+from app.log_analyses.schemas import Refusal, ReplicaAnswer, TextTable, TuningAnswer
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
@@ -119,7 +119,7 @@ def _print(out: Console, trial: Trial) -> None:
         out.print(escape(glitch.sentence))
 
 
-def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -> None:
+def analyze_log(file: Path, *, gains: str, json_out: Path | None, params_out: Path | None) -> None:
     """Print the analysis of a log, and write it and the proposed parameters where asked for.
 
     Raises InputError for a log that cannot be analysed, and for a parameter file where nothing is proposed.
@@ -129,28 +129,54 @@ def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -
     with reading(file, ANALYSED):
         beside = companion_of(file)
         content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
-    answer, _ = analyze_content(content, companion, file.name)
-    _print_answer(console(json_out), answer)
+    answer, _ = analyze_content(content, companion, file.name, gains)
+    out = console(json_out)
+    out.print(f"[bold]{escape(answer.file_name)}[/]")
+    _print_tuning(out, answer.tuning)
+    out.print()
+    _print_replica(out, answer.replica)
     write_json(json_out, answer.model_dump(mode="json"))
     if params_out is not None:
-        _write_parameters(params_out, answer)
+        _write_parameters(params_out, answer.tuning)
 
 
-def _print_answer(out: Console, answer: LogAnswer) -> None:
-    out.print(f"[bold]{escape(answer.file_name)}[/]")
+def _print_tuning(out: Console, answer: TuningAnswer | Refusal) -> None:
+    if isinstance(answer, Refusal):
+        _print_refusal(out, "No gains", answer)
+        return
     out.print(escape(f"Flight: {', '.join(answer.flight)}."))
     out.print(escape(f"Vehicle: {', '.join(answer.vehicle)}."))
-    out.print(table(answer.gains.columns, answer.gains.rows, title="This flight with other gains"))
-    for note in answer.notes:
-        out.print(escape(note), style="dim")
+    _print_table(out, answer.gains, "This flight with other gains", answer.notes)
     out.print(escape(answer.answer))
 
 
-def _write_parameters(target: Path, answer: LogAnswer) -> None:
-    if answer.parameter_file is None:
+def _print_replica(out: Console, answer: ReplicaAnswer | Refusal) -> None:
+    if isinstance(answer, Refusal):
+        _print_refusal(out, "Not compared with the replica of the controller", answer)
+        return
+    out.print(escape(f"Replica of the controller: {', '.join(answer.facts)}."))
+    _print_table(out, answer.table, "Recording and replica", answer.notes)
+    out.print(escape(answer.answer))
+
+
+def _print_table(out: Console, cells: TextTable, title: str, notes: Sequence[str]) -> None:
+    out.print(table(cells.columns, cells.rows, title=title))
+    for note in notes:
+        out.print(escape(note), style="dim")
+
+
+def _print_refusal(out: Console, what: str, why: Refusal) -> None:
+    out.print(escape(f"{what}: {why.title}"))
+    for problem in why.problems:
+        out.print(escape(f"  {problem.field}: {problem.reason}"))
+    out.print(escape(why.hint), style="dim")
+
+
+def _write_parameters(target: Path, answer: TuningAnswer | Refusal) -> None:
+    if isinstance(answer, Refusal) or answer.parameter_file is None:
         raise InputError(
             "No parameter file was written, because nothing is proposed.",
-            hint=answer.answer,
+            hint=answer.title if isinstance(answer, Refusal) else answer.answer,
             problems=(Problem("--params", "has nothing to write"),),
         )
     with writing("--params", target):

@@ -12,7 +12,7 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
 from app.vehicles.flight_end import FlightEnd
 
-Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
+Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
 
 NAMING: Final = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",

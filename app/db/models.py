@@ -259,19 +259,6 @@ class TrialPhotoRow(Base, Reported):
         return "trial", self.trial_id, self.trial.campaign_id
 
 
-class ControllerCheckRow(Base, Reported):
-    """A recorded controller compared with the replica, with all data of its page."""
-
-    topic = "check"
-    __tablename__ = "controller_check"
-
-    file_name: Mapped[str]
-    kind: Mapped[str]
-    passed: Mapped[bool]
-    result: Mapped[JsonObject] = mapped_column(deferred=True)
-    checked_at: Mapped[datetime] = mapped_column(default=utc_now)
-
-
 class FlightRow(Base, _Requested):
     """One request to a vehicle, written before it is sent, and what the vehicle answered.
 

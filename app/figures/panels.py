@@ -2,13 +2,11 @@
 by signal (the paper's Fig. 6).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final, Literal
 
 import numpy as np
 
-from app.core.records.trajectory import Overlaid
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 
@@ -185,22 +183,3 @@ def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
         "run 6": (palette.bad, 2, "longdash"),
     }
     return pens[style]
-
-
-def replica_plot(signals: Sequence[Overlaid], title: str, summary: str) -> Plot:
-    """Recorded signals beside those of the replica, one panel each, with the roles `recorded`, `replica`, `differs`."""
-    panels = (Panel(y_title=signal.label, digits=signal.digits, lines=_lines(signal)) for signal in signals)
-    return Plot(title=title, summary=summary, x_title="Time in the recording (s)", panels=tuple(panels))
-
-
-def _lines(signal: Overlaid) -> tuple[Line, ...]:
-    both = (
-        Line(name="Recorded", style="recorded", x=signal.time_s, y=signal.recorded),
-        Line(name="Replica", style="replica", x=signal.time_s, y=signal.replica),
-    )
-    if not signal.differing:
-        return both
-    return (
-        *both,
-        Line(name="Differs", style="differs", x=signal.differing_s, y=signal.differing, marks=True),
-    )

@@ -21,10 +21,10 @@ from app.log_analyses.schemas import (
     EstimatedValue,
     EstimatedVehicle,
     GainsInManoeuvre,
-    GainsTable,
-    LogAnswer,
     ManoeuvreNumbers,
     ParameterFile,
+    TextTable,
+    TuningAnswer,
 )
 
 _STEPS: Final[Mapping[str, CopterSteps]] = MappingProxyType(
@@ -34,14 +34,12 @@ _LEAST_SPREAD: Final = 0.01
 _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
 
-def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> LogAnswer:
+def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> TuningAnswer:
     """The answer in facts and numbers; `assumed` are the parameters that the log lacks, for which the firmware's
     defaults were assumed."""
     content = analysis.parameter_file(file_name)
     name = f"{PurePath(file_name).stem}{analysis.loop.texts.parameter_suffix}"
-    return LogAnswer(
-        file_name=file_name,
-        autopilot=analysis.loop.texts.autopilot,
+    return TuningAnswer(
         answer=analysis.answer,
         proposes=analysis.proposed is not None,
         starts_campaign=analysis.proposed is not None,
@@ -125,11 +123,11 @@ def _flight(analysis: Analysis) -> list[str]:
     ]
 
 
-def _table(analysis: Analysis) -> GainsTable:
+def _table(analysis: Analysis) -> TextTable:
     flown, *others = analysis.assessments
     listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
     names = [name.removeprefix(analysis.loop.texts.prefix) for name in flown.gains]
-    return GainsTable(
+    return TextTable(
         columns=["Gains", *names, "Predicted error", "90 % interval", "Throttle activity", "Margin"],
         rows=[_row(each) for each in listed],
     )

@@ -10,18 +10,26 @@ from app.log_analyses.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
 VehicleId = Annotated[int | None, Query(ge=1, le=2**63 - 1)]
+FlownGains = Annotated[str, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")]
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 
 
 @router.post("", openapi_extra=REQUEST_BODY)
-def analyze_log(record: Record) -> LogAnalysis:
-    """Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains.
+def analyze_log(record: Record, gains: FlownGains = "") -> LogAnalysis:
+    """Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains; and how well the replica of
+    the autopilot's vertical loop explains it. Where only one of both is possible, the other says why not.
 
     ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, a .tlog of altitude steps under either, or
-    Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m. Takes some seconds;
-    nothing is stored.
+    Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m; or a trace of the
+    vertical loop with a row for every step, .csv or .csv.gz. Takes some seconds; nothing is stored.
     """
-    return service.analyze_upload(record.content(), record.read_companion(), name=record.name)
+    return service.analyze_upload(record.content(), record.read_companion(), name=record.name, gains=gains)
+
+
+@router.get("/example")
+def get_example_analysis() -> LogAnalysis:
+    """Analyse the example: a takeoff that comes with Gainline, recorded from the autopilot's own code."""
+    return service.analyze_example()
 
 
 @router.post("/campaign", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)

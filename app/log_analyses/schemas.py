@@ -1,11 +1,12 @@
 """What a log tells about the altitude control of its vehicle: for a person and, in numbers, for scripts."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.common.schemas import Gains, Schema
+from app.autopilots.replica_check import Kind, SignalResult
+from app.common.schemas import Gains, ProblemField, Schema
 from app.core.analysis.analysis import Behaviour
 from app.figures.base import Card
 from app.figures.theme import ThemeName
@@ -114,8 +115,8 @@ class TakeoffNumbers(Schema):
     proposed: GainsInTakeoff | None
 
 
-class GainsTable(Schema):
-    """Gain sets compared, in words: the sets flown, the proposed one, and others."""
+class TextTable(Schema):
+    """A table of formatted cells."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -128,11 +129,9 @@ class ParameterFile(Schema):
     content: str
 
 
-class LogAnswer(Schema):
-    """The result of a log analysis without its figure."""
+class TuningAnswer(Schema):
+    """How the altitude was controlled, the fitted vehicle, and better gains."""
 
-    file_name: str
-    autopilot: Annotated[str, Field(description="its title")]
     answer: str
     proposes: Annotated[bool, Field(description="whether gains are proposed; if not, `answer` says why")]
     starts_campaign: Annotated[bool, Field(description="whether a campaign can start from this log")]
@@ -142,13 +141,50 @@ class LogAnswer(Schema):
     ]
     flight: Annotated[Sequence[str], Field(description="how the altitude was controlled")]
     vehicle: Annotated[Sequence[str], Field(description="the fitted vehicle")]
-    gains: GainsTable
+    gains: Annotated[TextTable, Field(description="the sets flown, the proposed one, and others")]
     notes: Annotated[Sequence[str], Field(description="how to read the table, and precautions")]
     parameter_file: ParameterFile | None
     numbers: ManoeuvreNumbers | TakeoffNumbers
 
 
+class ReplicaAnswer(Schema):
+    """How well Gainline's replica of the autopilot's vertical loop explains the log."""
+
+    answer: str
+    agrees: Annotated[bool, Field(description="whether every signal does")]
+    kind: Annotated[Kind, Field(description="the log of a flight, or a trace with every step")]
+    facts: Annotated[Sequence[str], Field(description="what was compared, and the gains")]
+    table: Annotated[TextTable, Field(description="the difference of every signal")]
+    notes: Annotated[Sequence[str], Field(description="what is allowed, and how it was compared")]
+    rows: Annotated[int, Field(description="number of samples or steps compared")]
+    first_different_row: Annotated[int | None, Field(description="counted from 0; null: none, or not counted")]
+    gains: Annotated[Gains | None, Field(description="null if they change within the recording")]
+    gains_from: str
+    better_gains: Annotated[Gains | None, Field(description="other gains that reproduce more of the commands")]
+    signals: Sequence[SignalResult]
+
+
+class Refusal(Schema):
+    """Why the log does not answer: what happened, the fields concerned, and what to do."""
+
+    title: str
+    hint: str
+    problems: list[ProblemField]
+
+
+class LogAnswer(Schema):
+    """The result of a log analysis without its figures: at least one of both parts."""
+
+    file_name: str
+    autopilot: Annotated[str, Field(description="its title")]
+    tuning: TuningAnswer | Refusal
+    replica: ReplicaAnswer | Refusal
+
+
+Part = Literal["tuning", "replica"]
+
+
 class LogAnalysis(LogAnswer):
     """The result of a log analysis."""
 
-    figures: Annotated[dict[ThemeName, Card], Field(description="by theme")]
+    figures: Annotated[dict[ThemeName, dict[Part, list[Card]]], Field(description="by theme, of each part")]

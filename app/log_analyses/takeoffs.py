@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Final
 
-from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.takeoff import Takeoff as Experiment
@@ -15,13 +14,12 @@ from app.figures.panels import Line, Panel, Plot, Style
 from app.figures.scale import thinned
 from app.log_analyses.schemas import (
     GainsInTakeoff,
-    GainsTable,
-    LogAnswer,
     ParameterFile,
     TakeoffNumbers,
+    TextTable,
+    TuningAnswer,
 )
 
-_AUTOPILOT: Final = next(each for each in AUTOPILOTS.values() if isinstance(each.experiments[0], Experiment))
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""
 _SHOWN_S: Final = 8.0
@@ -48,11 +46,9 @@ def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeof
     return known
 
 
-def answer_of(analysis: TakeoffAnalysis, file_name: str) -> LogAnswer:
+def answer_of(analysis: TakeoffAnalysis, file_name: str) -> TuningAnswer:
     """The answer in facts and numbers."""
-    return LogAnswer(
-        file_name=file_name,
-        autopilot=_AUTOPILOT.title,
+    return TuningAnswer(
         answer=analysis.answer,
         proposes=analysis.proposed is not None,
         starts_campaign=True,
@@ -139,10 +135,10 @@ def _vehicle(analysis: TakeoffAnalysis) -> list[str]:
     ]
 
 
-def _table(analysis: TakeoffAnalysis) -> GainsTable:
+def _table(analysis: TakeoffAnalysis) -> TextTable:
     flown, *others = analysis.assessments
     listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
-    return GainsTable(
+    return TextTable(
         columns=["Gains", *flown.gains, "Flown", "Predicted", "90 % interval", "Gate"],
         rows=[
             [

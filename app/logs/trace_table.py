@@ -25,7 +25,7 @@ from app.logs.formats import head_of
 
 MAX_ROWS: Final = 1_000_000
 MAX_BYTES: Final = 256 * 2**20
-GZIP: Final = b"\x1f\x8b"
+_GZIP: Final = b"\x1f\x8b"
 _IN_MEMORY_BYTES: Final = 2**22
 _DESCRIPTION_CHARACTERS: Final = 2**16
 _GZIP_WINDOW: Final = 31
@@ -59,13 +59,6 @@ class TraceChecks:
 
     def malformed(self, field: str, reason: str) -> InputError:
         return InputError(f"{self.name} cannot be replayed.", hint=self.hint, problems=(Problem(field, reason),))
-
-    def damaged(self, error: Exception) -> InputError:
-        return InputError(
-            f"{self.name} is damaged or not a text file: {error}.",
-            hint=self.hint,
-            problems=(Problem("file", "is damaged or not a text file"),),
-        )
 
     def require_flags(self, table: TraceTable, columns: Collection[str]) -> None:
         for column in columns:
@@ -103,12 +96,12 @@ class TraceChecks:
 
 def has_columns(beginning: bytes, columns: Collection[str]) -> bool:
     """Whether a file with this beginning, plain or gzipped, is such a run with at least these columns."""
-    first, _, rest = _unzipped(beginning).partition(b"\n")
+    first, _, rest = unzipped(beginning).partition(b"\n")
     header = rest.partition(b"\n")[0].decode("utf-8", "replace")
     return first.startswith(b"#") and set(columns) <= {name.strip() for name in header.split(",")}
 
 
-def _unzipped(head: bytes) -> bytes:
+def unzipped(head: bytes) -> bytes:
     """The beginning of the file that is gzipped into one with this head; the head itself if it is not gzipped."""
     try:
         return zlib.decompressobj(_GZIP_WINDOW).decompress(head)
@@ -116,16 +109,11 @@ def _unzipped(head: bytes) -> bytes:
         return head
 
 
-def is_zipped(stream: BinaryIO) -> bool:
-    """Whether the stream begins as a gzipped file; it is at its beginning afterwards."""
-    return head_of(stream).startswith(GZIP)
-
-
 @contextmanager
-def text_of(checks: TraceChecks, stream: BinaryIO, *, zipped: bool) -> Iterator[io.TextIOWrapper]:
-    """The text of a run, decompressed to a bounded size: a small file may expand to a huge one. Raises InputError, also
-    while it is read, if it is damaged."""
-    source = gzip.GzipFile(fileobj=stream, mode="rb") if zipped else stream
+def text_of(checks: TraceChecks, stream: BinaryIO) -> Iterator[io.TextIOWrapper]:
+    """The text of a run, plain or gzipped, decompressed to a bounded size: a small file may expand to a huge one.
+    Raises InputError, also while it is read, if it is damaged."""
+    source = gzip.GzipFile(fileobj=stream, mode="rb") if head_of(stream).startswith(_GZIP) else stream
     try:
         with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as plain:
             while chunk := source.read(2**20):
@@ -139,8 +127,12 @@ def text_of(checks: TraceChecks, stream: BinaryIO, *, zipped: bool) -> Iterator[
             plain.seek(0)
             with io.TextIOWrapper(plain, encoding="utf-8", newline="") as text:
                 yield text
-    except (EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
-        raise checks.damaged(error) from error
+    except (EOFError, zlib.error, gzip.BadGzipFile, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            f"{checks.name} is damaged or not a text file: {error}.",
+            hint=checks.hint,
+            problems=(Problem("file", "is damaged or not a text file"),),
+        ) from error
 
 
 def read_rows(
@@ -184,20 +176,15 @@ def read_trace_table(
     def value(column: str, text: str) -> float:
         return np.nan if not text and column in may_be_empty else _finite(text)
 
-    try:
-        with text_of(checks, stream, zipped=is_zipped(stream)) as text:
-            description = _description(checks, text.readline(_DESCRIPTION_CHARACTERS))
-            reader = csv.reader(text)
-            header = next(reader, [])
-            if missing := tuple(
-                Problem(f"line 2, {each}", "column is missing") for each in columns if each not in header
-            ):
-                raise InputError(f"{name} is not a trace of this loop.", hint=hint, problems=missing)
-            if twice := next((each for each in header if header.count(each) > 1), None):
-                raise checks.malformed(f"line 2, {twice}", "column appears twice")
-            values = array("d", read_rows(checks, reader, header, value, first_line=_FIRST_ROW))
-    except gzip.BadGzipFile as error:
-        raise checks.damaged(error) from error
+    with text_of(checks, stream) as text:
+        description = _description(checks, text.readline(_DESCRIPTION_CHARACTERS))
+        reader = csv.reader(text)
+        header = next(reader, [])
+        if missing := tuple(Problem(f"line 2, {each}", "column is missing") for each in columns if each not in header):
+            raise InputError(f"{name} is not a trace of this loop.", hint=hint, problems=missing)
+        if twice := next((each for each in header if header.count(each) > 1), None):
+            raise checks.malformed(f"line 2, {twice}", "column appears twice")
+        values = array("d", read_rows(checks, reader, header, value, first_line=_FIRST_ROW))
     table = np.array(values).reshape(-1, len(header))
     return TraceTable(description, {each: np.ascontiguousarray(table[:, k]) for k, each in enumerate(header)})
 

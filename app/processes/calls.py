@@ -194,6 +194,6 @@ def _too_much(limits: Limits) -> InputError:
         problems=(
             Problem("file", f"needs more than {limits.processor_s} s or {limits.memory_bytes / 2**30:g} GiB to read"),
         ),
-        hint="Check that it is the correct log. `gainline import` and `gainline controller check` read files "
-        "without these limits of time and memory.",
+        hint="Check that it is the correct log. `gainline import` and `gainline analyze` read files without these "
+        "limits of time and memory.",
     )

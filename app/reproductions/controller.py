@@ -22,7 +22,7 @@ _PANELS: Final = {
 def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -> Result:
     """Replay a recorded run and compare every output of every step. Raises InputError if the file is not a trace."""
 
-    from app.autopilots.paparazzi.loop_check import read_loop_trace  # noqa: PLC0415 - imports the readers of logs
+    from app.autopilots.paparazzi.replica_check import read_loop_trace  # noqa: PLC0415 - imports the readers of logs
 
     on_progress(0.0, "reading the recorded run")
     trace = read_loop_trace(trace_file)

@@ -118,7 +118,6 @@ class BodyLimitMiddleware:
         self._uploads = {
             "/trajectory": of_flight,
             "/records": of_flight,
-            "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),
             "/log-analyses": analysed,
             "/log-analyses/campaign": analysed,
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),

@@ -1,5 +1,5 @@
 import { type ComponentType, lazy, useEffect } from "react";
-import { Route, Routes } from "react-router";
+import { Navigate, Route, Routes } from "react-router";
 import { ApiError, PAGE_MISSING } from "./api/problems";
 import { loadPlotly } from "./charts/plotly";
 import { CampaignPage } from "./features/campaign/CampaignPage";
@@ -9,7 +9,6 @@ import type * as PageModule from "./pages";
 import { NotFoundPage } from "./ui/NotFound";
 
 const ComparePage = lazyPage("ComparePage");
-const ControllerPage = lazyPage("ControllerPage");
 const LogAnalysisPage = lazyPage("LogAnalysisPage");
 const EditVehiclePage = lazyPage("EditVehiclePage");
 const FlightPage = lazyPage("FlightPage");
@@ -38,7 +37,7 @@ export function App() {
         <Route path="vehicles/:vehicleId" element={<VehiclePage />} />
         <Route path="vehicles/:vehicleId/edit" element={<EditVehiclePage />} />
         <Route path="reproductions" element={<ReproductionsPage />} />
-        <Route path="controller/:checkId?" element={<ControllerPage />} />
+        <Route path="controller/*" element={<Navigate to="/log-analysis" replace />} />
         <Route path="log-analysis" element={<LogAnalysisPage />} />
         <Route path="jobs" element={<JobsPage />} />
         <Route path="settings" element={<SettingsPage />} />

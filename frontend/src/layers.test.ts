@@ -13,7 +13,7 @@ const LAYERS = [
   "frame",
   "features/jobs",
   "features/fleet",
-  "features/checks",
+  "features/log-analysis",
   "features/new-campaign",
   "features/settings",
   "features/campaign",

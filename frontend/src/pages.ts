@@ -1,8 +1,6 @@
 /** All pages but the first, in one bundle that is loaded while the first page is idle. */
 
 export { FlightPage } from "./features/campaign/flights/FlightPage";
-export { ControllerPage } from "./features/checks/ControllerPage";
-export { LogAnalysisPage } from "./features/checks/LogAnalysisPage";
 export { ComparePage } from "./features/compare/ComparePage";
 export { EditVehiclePage } from "./features/fleet/EditVehiclePage";
 export { NewVehiclePage } from "./features/fleet/NewVehiclePage";
@@ -11,5 +9,6 @@ export { VehiclesPage } from "./features/fleet/VehiclesPage";
 export { FlyPage } from "./features/fly/FlyPage";
 export { JobsPage } from "./features/jobs/JobsPage";
 export { ReproductionsPage } from "./features/jobs/ReproductionsPage";
+export { LogAnalysisPage } from "./features/log-analysis/LogAnalysisPage";
 export { NewCampaignPage } from "./features/new-campaign/NewCampaignPage";
 export { SettingsPage } from "./features/settings/SettingsPage";

@@ -12,7 +12,6 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 NAMES: Final = re.compile(r"ardupilot|arducopter|px4|paparazzi", re.IGNORECASE)
 
 EXCEPTIONS: Final = {
-    "app/cli/reproduce.py": "`gainline controller check` prints what only the check of Paparazzi's ground log has",
     "app/reproductions/controller.py": "the paper's Fig. 6 replays a recording of Paparazzi's controller",
 }
 """Files that name an autopilot in code, and why. At most ten."""

@@ -13,6 +13,8 @@ from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log
 
+TRACE = Path(__file__).parents[1] / "data" / "vertical_loop" / "takeoff_default.csv.gz"
+
 
 def analyze(*arguments: str | Path) -> Result:
     return CliRunner().invoke(app, ["analyze", *map(str, arguments)])
@@ -45,7 +47,7 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, motor lag 0 ± 3 ms" in " ".join(result.output.split())
     for name in ("As flown", "Proposed", "ArduCopter's default gains", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
         assert name in result.output
-    found = json.loads(document.read_text())
+    found = json.loads(document.read_text())["tuning"]
     numbers = found["numbers"]
     gains = numbers["proposed"]["gains"]
     assert numbers["proposed"]["error_m"] < 0.2 * numbers["assessments"][0]["error_m"]
@@ -76,6 +78,38 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
 def test_the_document_alone_can_be_printed(takeoff: Path) -> None:
     result = analyze(takeoff, "--json", "-")
     assert json.loads(result.stdout)["file_name"] == "takeoff.tlog"
+
+
+@pytest.mark.complete
+def test_a_log_named_in_place_of_the_document_is_not_overwritten(takeoff: Path, steps: Path) -> None:
+    """Observed: `--json LOG LOG` replaced the first log by the result of the second."""
+    before = steps.read_bytes()
+    result = analyze("--json", steps, takeoff)
+    assert result.exit_code == 2
+    assert "is not overwritten" in " ".join(result.output.split())
+    assert steps.read_bytes() == before
+
+
+def test_a_trace_is_compared_with_the_replica_and_gives_no_gains(tmp_path: Path) -> None:
+    document = tmp_path / "trace.json"
+    result = analyze(TRACE, "--json", document)
+    assert result.exit_code == 0, result.output
+    output = " ".join(result.output.split())
+    assert f"No gains: {TRACE.name} is a trace of the loop, not the log of a flight." in output
+    assert "Replica of the controller: step-by-step trace, gains kp 283, ki 13, kd 82, of the recording." in output
+    assert "thrust, commanded thrust exact 0 counts 0 counts" in output
+    assert "steps are exact in all 7 signals" in output
+    found = json.loads(document.read_text())
+    assert (found["autopilot"], found["replica"]["agrees"]) == ("Paparazzi", True)
+    assert "is a trace of the loop" in analyze(TRACE, "--params", tmp_path / "gains.xml").output
+
+
+def test_the_replica_uses_the_gains_given(tmp_path: Path) -> None:
+    flight = write(tmp_path, Flight(gains={"kp": 283, "ki": 13, "kd": 82}, fly_s=6.0))
+    output = analyze(flight, "--gains", "300,13,82").output
+    assert "The replica differs" in output
+    assert "More commands match with kp 283, ki 13, kd 82: were other gains flown?" in output
+    assert "gains: must be three whole numbers, KP,KI,KD" in analyze(flight, "--gains", "1,2").output
 
 
 @pytest.mark.complete

@@ -140,7 +140,7 @@ def test_a_log_that_suffices_gives_the_vehicle_and_gains_for_it(log: UsedLog, tm
     out = tmp_path / "answer.json"
     code, output = analyze(tmp_path, log.name, log.made(), "--json", str(out))
     assert code == 0, output
-    numbers = json.loads(out.read_text())["numbers"]
+    numbers = json.loads(out.read_text())["tuning"]["numbers"]
     vehicle, proposed = numbers["vehicle"], numbers["proposed"]
     assert vehicle["hover_throttle"]["mean"] == pytest.approx(log.hover_throttle, abs=0.005)
     assert vehicle["motor_lag_s"]["mean"] == pytest.approx(log.motor_lag_s, abs=0.03)

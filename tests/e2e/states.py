@@ -26,7 +26,6 @@ from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
-from app.controller_checks import service as controller_checks
 from app.db.base import Base
 from app.db.models import EventRow, ProposalRow
 from app.db.session import Database
@@ -178,11 +177,6 @@ class States:
     def vehicle_of(self, campaign_id: int) -> int:
         with self._database.read() as session:
             return campaigns.get_row(session, campaign_id).vehicle_id
-
-    def check_of_the_example(self) -> int:
-        """A controller check."""
-        result = controller_checks.examine_example()
-        return self._write(lambda session: controller_checks.store_example(session, result).id)
 
     def reproduce(self, name: str) -> None:
         """A reproduction that was run."""

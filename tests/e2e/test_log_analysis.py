@@ -1,4 +1,5 @@
-"""The page of a log analysis: a log dropped and chosen, its answer, the parameter file, and logs that are refused."""
+"""The page of a log analysis: a log dropped and chosen, its answer, the parameter file, the comparison with the
+replica, and logs that are refused."""
 
 import re
 from base64 import b64encode
@@ -10,8 +11,13 @@ from playwright.sync_api import FilePayload, expect
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded
 from tests.logs.written import ardupilot_log
+
+DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
+FEEDBACK = 16
+"""Place of fb_cmd in a line of VERT_LOOP."""
 
 DROP = """([name, content]) => {
   const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
@@ -28,10 +34,13 @@ def page_of_analysis(open_dashboard: Opener, empty_server: Server) -> Dashboard:
     return dashboard
 
 
-def choose(dashboard: Dashboard, name: str, content: bytes) -> None:
+def choose(dashboard: Dashboard, name: str, content: bytes, companion: str = "") -> None:
+    files = {name: content} | ({"flight.log": companion.encode()} if companion else {})
     with dashboard.page.expect_file_chooser() as chooser:
         dashboard.button("Choose log").click()
-    chooser.value.set_files([FilePayload(name=name, mimeType="application/octet-stream", buffer=content)])
+    chooser.value.set_files(
+        [FilePayload(name=each, mimeType="application/octet-stream", buffer=it) for each, it in files.items()]
+    )
 
 
 def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, tmp_path: Path) -> None:
@@ -59,6 +68,12 @@ def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, 
     proposed = rows.nth(1).locator("td").all_inner_texts()
     assert [line.split(",")[1] for line in lines] == proposed[1:5]
     expect(dashboard.button("Start campaign")).to_be_visible()
+    expect(article).to_contain_text(
+        "The replica agrees: all 238 logged rows are within the tolerances in all 5 signals."
+    )
+    signals = article.get_by_role("region", name="Difference of every signal").locator("tbody tr").all_inner_texts()
+    assert [row.split(",")[0] for row in signals] == ["z_d_m", "v_d_m_s", "a_d_m_s2", "v_t_m_s", "throttle"]
+    assert {one["meta"]["role"] for one in dashboard.traces("Shaped target")} == {"recorded", "replica"}
 
 
 def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_starts_a_campaign(
@@ -69,6 +84,7 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
     article = page.get_by_role("article", name="Analysis of takeoff.tlog")
     expect(article).to_contain_text("Mean distance from 3 m: 0.330 m measured.")
     expect(article).to_contain_text("hover throttle 0.63")
+    expect(article).to_contain_text("It contains no VERT_LOOP, the loop's inputs and commands.")
     rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
     expect(rows).to_have_count(2)
     assert "Predicted with the proposed gains" in {
@@ -90,13 +106,63 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
     assert [f"{gains[name]:g}" for name in ("kp", "ki", "kd")] == proposed
 
 
-def test_a_log_that_cannot_be_analysed_is_refused_and_the_next_one_is_not(page_of_analysis: Dashboard) -> None:
+def test_a_log_that_gives_no_gains_says_why_below_what_it_tells(page_of_analysis: Dashboard) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.bin", recorded("px4_takeoff.ulg"))
-    expect(page.get_by_role("alert")).to_contain_text("Takeoffs are left out: their ramp decides, not the gains.")
+    headings = page.get_by_role("article", name="Analysis of takeoff.bin").get_by_role("heading", level=2)
+    expect(headings.first).to_have_text("takeoff.bin")
+    expect(headings.nth(1)).to_have_text("Replica of the controller")
+    expect(headings.last).to_have_text("No gains from this log")
+    expect(page.get_by_role("article")).to_contain_text("Takeoffs are left out: their ramp decides, not the gains.")
     choose(dashboard, "flight.bin", ardupilot_log(simulated_flight(GUSTY)))
     expect(page.get_by_role("article", name="Analysis of flight.bin")).to_be_visible()
-    expect(page.get_by_role("alert")).to_have_count(0)
+    expect(page.get_by_text("No gains from this log")).to_have_count(0)
+
+
+def test_one_click_shows_what_the_replica_is(page_of_analysis: Dashboard) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    dashboard.button("Analyse example").click()
+    expect(page.get_by_text("The replica agrees: all 8\N{NARROW NO-BREAK SPACE}192 steps are exact")).to_be_visible()
+    shown = page.get_by_role("region", name="Difference of every signal").locator("tbody tr").all_inner_texts()
+    assert len(shown) == 7
+    assert all("0 counts" in row and "exact" in row for row in shown)
+    told = dashboard.get("/log-analyses/example")["figures"]["light"]["replica"]
+    for card in told:
+        expect(dashboard.plot(card["title"])).to_be_visible()
+        drawn = dashboard.traces(card["title"])
+        assert [(one["meta"], one["x"], one["y"]) for one in drawn] == [
+            (one["meta"], one["x"], one["y"]) for one in card["figure"]["data"]
+        ]
+
+
+def with_other_feedback(data: str, commands: int) -> str:
+    """The log with a feedback that its loop cannot have computed in so many of its commands."""
+    lines = [line.split() for line in data.splitlines()]
+    for fields in [fields for fields in lines if fields[2] == "VERT_LOOP"][-commands:]:
+        fields[FEEDBACK] = str(int(fields[FEEDBACK]) + 50)
+    return "\n".join(" ".join(fields) for fields in lines) + "\n"
+
+
+def test_a_log_of_another_loop_is_marked_where_it_differs(page_of_analysis: Dashboard) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    other = with_other_feedback(data_of(Flight(DEFAULT)), 200)
+    choose(dashboard, "flight.data", other.encode(), COMPANION)
+    expect(page.get_by_text("The replica differs: ")).to_be_visible()
+    marks = dashboard.trace("Commands", "differs", line="Differs")
+    assert marks is not None
+    assert len(marks["x"]) == 200
+
+
+def test_a_calm_log_asks_for_its_gains(page_of_analysis: Dashboard) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    lines = data_of(Flight(DEFAULT)).splitlines()
+    calm = "\n".join(line for line in lines if float(line.split()[0]) > 40.0)
+    choose(dashboard, "calm.data", calm.encode())
+    expect(page.get_by_role("alert")).to_contain_text("calm.data does not contain the gains flown")
+    page.get_by_label("Gains flown: kp, ki, kd").fill("283, 13, 82")
+    dashboard.button("Analyse calm.data with these gains").click()
+    expect(page.get_by_role("article")).to_contain_text("The replica agrees: ")
+    expect(page.get_by_role("article")).to_contain_text("gains kp 283, ki 13, kd 82, given")
 
 
 def test_the_same_log_can_be_sent_again_and_another_theme_sends_nothing(page_of_analysis: Dashboard) -> None:

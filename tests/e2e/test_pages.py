@@ -152,19 +152,6 @@ class Pages:
         return f"/fly/{self._states.plan(self._states.campaign(seed=5), GAINS)}"
 
     @cached_property
-    def controller_check_id(self) -> int:
-        return self._states.check_of_the_example()
-
-    @cached_property
-    def controller(self) -> str:
-        _ = self.controller_check_id
-        return "/controller"
-
-    @cached_property
-    def controller_check(self) -> str:
-        return f"/controller/{self.controller_check_id}"
-
-    @cached_property
     def reproductions(self) -> str:
         self._states.reproduce("controller")
         return "/reproductions"
@@ -182,6 +169,7 @@ class Pages:
 FIXED = {
     "new": "/new",
     "log-analysis": "/log-analysis",
+    "log-analysed": "/controller",
     "new-vehicle": "/vehicles/new",
     "settings": "/settings",
     "missing": "/no/such/page",
@@ -198,8 +186,8 @@ NAMES: dict[str, tuple[str, ...]] = {
     "vehicles/:vehicleId": ("vehicle", "shared-vehicle"),
     "vehicles/:vehicleId/edit": ("edit-vehicle",),
     "reproductions": ("reproductions",),
-    "controller/:checkId?": ("controller", "controller-check"),
     "log-analysis": ("log-analysis",),
+    "controller/*": ("log-analysed",),
     "jobs": ("jobs",),
     "settings": ("settings",),
     "*": ("missing",),
@@ -269,6 +257,9 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
     dashboard = open_dashboard(shared_server.url, viewport=DESK)
     page = dashboard.page
     dashboard.open(pages.path(name))
+    if name == "log-analysed":
+        dashboard.button("Analyse example").click()
+        expect(page.get_by_role("article")).to_be_visible()
     refused = []
     for look in LOOKS:
         state = f"{name}-{look.size}-{look.theme}"

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.loop_check import ardupilot_loop_log
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.replay import LoopLog
+from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.core.errors import InputError
 from tests.logs.recorded import recorded
 

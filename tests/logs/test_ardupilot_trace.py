@@ -3,9 +3,9 @@ import json
 
 import pytest
 
-from app.autopilots.ardupilot.loop_check import COLUMNS, read_ardupilot_trace
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.replay import Hover, LoopTrace
+from app.autopilots.ardupilot.replica_check import COLUMNS, read_ardupilot_trace
 from app.core.errors import InputError
 from app.logs.trace_table import has_columns
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from app.autopilots.paparazzi.loop_check import COLUMNS, read_loop_trace
+from app.autopilots.paparazzi.replica_check import COLUMNS, read_loop_trace
 from app.core.errors import InputError
 
 HEADER = ",".join(COLUMNS)
@@ -72,7 +72,7 @@ def test_missing_and_damaged_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="damaged or not a text file"):
         read_loop_trace(damaged)
     damaged.write_bytes(b"not gzip at all")
-    with pytest.raises(InputError, match="could not be read"):
+    with pytest.raises(InputError, match="is not a trace"):
         read_loop_trace(damaged)
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\xff\xfe\x00")

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.autopilots.px4.log import read_px4
-from app.autopilots.px4.loop_check import px4_loop_log
 from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.replay import LoopLog, replica_of
 from app.autopilots.px4.replica.vertical import FLIGHT
+from app.autopilots.px4.replica_check import px4_loop_log
 from app.core.errors import InputError
 from tests.logs.recorded import recorded
 

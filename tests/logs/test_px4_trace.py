@@ -4,10 +4,10 @@ import json
 import numpy as np
 import pytest
 
-from app.autopilots.px4.loop_check import COLUMNS, read_px4_trace
 from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.replay import LoopTrace
 from app.autopilots.px4.replica.vertical import INPUTS, OUTPUTS
+from app.autopilots.px4.replica_check import COLUMNS, read_px4_trace
 from app.core.errors import InputError
 from app.logs.trace_table import has_columns
 

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from app.autopilots.loop_checks import examine_content
 from app.autopilots.readers import read_content
 
 NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")
 DATABASE = ("pydantic", "sqlalchemy")
-READS_LOGS = re.compile(r"app\.autopilots\.(readers|tlog|\w+\.(log|flight|loop_check))")
+READS_LOGS = re.compile(r"app\.autopilots\.(readers|tlog|\w+\.(log|flight|replica_check))")
 
 SERVE = """
 import sys
@@ -92,5 +91,4 @@ def test_requests_never_find_a_package_that_another_thread_is_importing() -> Non
 @pytest.mark.complete
 def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:
     """Each file has a separate process, whose start the sender of the file waits for."""
-    modules = f"{read_content.__module__}, {examine_content.__module__}"
-    assert not imported(f"import {modules}").intersection(("fastapi", "plotly", *DATABASE))
+    assert not imported(f"import {read_content.__module__}").intersection(("fastapi", "plotly", *DATABASE))

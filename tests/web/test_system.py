@@ -181,7 +181,7 @@ def test_a_backup_never_takes_the_room_that_flights_need(
     ("path", "size", "otherwise"),
     [
         ("/api/bundles", "1024 MiB", "gainline unbundle"),
-        ("/api/controller-checks", "48 MiB", "gainline controller check"),
+        ("/api/log-analyses", "48 MiB", "gainline analyze"),
         ("/api/trials/1/photos", "10 MiB", "a lower resolution"),
         ("/api/campaigns", "1 MiB", "no operation of the API needs more"),
     ],

@@ -187,9 +187,6 @@ PAPARAZZI: Final = Autopilot(
     label="Paparazzi (AR.Drone 2)",
     address="udp:192.168.1.1:4245@4244",
     simulated_address="udp:127.0.0.1:4245@4244",
-    recordings="the .data file with VERT_LOOP messages (add its .log, which contains the gains), or a trace with a row "
-    "for every control step, .csv or .csv.gz",
-    recording_types=(".data", ".log", ".csv", ".gz", "text/csv"),
     sends_to_port=True,
     heartbeat_s=0.5,
     lift_off_s=1.5,

@@ -120,9 +120,6 @@ def select_bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
     return np.array(sorted(needed), dtype=np.uint64)
 
 
-Curve = tuple[float, ...]
-
-
 @dataclass(frozen=True, slots=True)
 class Overlay:
     """Recorded and replicated signals of the same samples.
@@ -135,19 +132,3 @@ class Overlay:
     recorded: Mapping[str, Samples | NDArray[np.int64]]
     replica: Mapping[str, Samples | NDArray[np.int64]]
     differs: Mapping[str, NDArray[np.bool_]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Overlaid:
-    """One signal over time, recorded and from the replica, of equal length.
-
-    `differing_s` and `differing` are time and value of each mark where the recorded signal differs.
-    """
-
-    label: str
-    digits: int
-    time_s: Curve
-    recorded: Curve
-    replica: Curve
-    differing_s: Curve = ()
-    differing: Curve = ()

@@ -2,13 +2,13 @@
 
 import { useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
-import { analyzeLog, startCampaign } from "./generated";
+import { analyzeLog, getExampleAnalysis, startCampaign } from "./generated";
 import type { RecordFiles } from "./records";
 
-export type { LogAnalysis } from "./generated";
+export type { LogAnalysis, Refusal, ReplicaAnswer, TuningAnswer } from "./generated";
 
-/** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
-export const ANALYSED_FILES = ".bin,.ulg,.tlog,.data,.log";
+/** File types of the file chooser. A .log file belongs to Paparazzi's .data file; traces are .csv or .csv.gz. */
+export const ANALYSED_FILES = ".bin,.ulg,.tlog,.data,.log,.csv,.gz,text/csv";
 
 interface CampaignStart {
   files: RecordFiles;
@@ -23,6 +23,16 @@ export function useStartCampaign() {
   });
 }
 
+export interface AnalysedLog {
+  /** Null: the example that comes with Gainline. */
+  files: RecordFiles | null;
+  /** `KP,KI,KD` as flown, if the log does not contain them. */
+  gains?: string;
+}
+
 export function useAnalyzeLog() {
-  return useMutation({ mutationFn: (files: RecordFiles) => answer(analyzeLog({ body: { ...files } })) });
+  return useMutation({
+    mutationFn: ({ files, gains = "" }: AnalysedLog) =>
+      answer(files === null ? getExampleAnalysis() : analyzeLog({ body: { ...files }, query: { gains } })),
+  });
 }

@@ -11,7 +11,6 @@ const PAGES = [
   { to: "/compare", title: "Compare", inRow: false },
   { to: "/reproductions", title: "Reproductions", inRow: false },
   { to: "/log-analysis", title: "Log analysis", inRow: false },
-  { to: "/controller", title: "Controller check", inRow: false },
   { to: "/jobs", title: "Jobs", inRow: false },
   { to: "/settings", title: "Settings", inRow: false },
 ] as const;

@@ -44,7 +44,6 @@ export type QueryKey = readonly (string | number)[];
 const TELLING = new Set(["campaign", "trial", "flight", "proposal", "vehicle"]);
 
 function keysOf(change: Change): QueryKey[] {
-  if (change.topic === "check") return [["checks"]];
   const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
   if (change.topic === "trial") keys.push(["trial", change.entity_id]);

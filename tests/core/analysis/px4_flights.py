@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from app.autopilots.px4.experiments import Px4Loop
-from app.autopilots.px4.loop_check import read_px4_trace
 from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY, INPUTS, OUTPUTS
+from app.autopilots.px4.replica_check import read_px4_trace
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import FinerSegment
 from app.core.records.trajectory import Samples

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.paparazzi.loop_check import read_loop_trace
+from app.autopilots.paparazzi.replica_check import read_loop_trace
 from app.core.control.vertical_guidance import (
     FB_CMD,
     FF_CMD,

@@ -41,7 +41,6 @@ TOY: Final = Autopilot(
     experiments=(Takeoff(),),
     dialect=COMMON,
     autopilot=MAKE,
-    recordings="none",
     lift_off_s=3.0,
     reference="target",
     flying_modes=frozenset({str(AUTO)}),

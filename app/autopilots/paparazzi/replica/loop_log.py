@@ -84,6 +84,7 @@ class CommandCheck:
     `exact` samples agree to the last bit; `tilted` of these with a tilt of up to `largest_tilt_deg`, `rounded` with an
     r33 that rounding made one count larger than level. `stale` counts the samples that agree only if the named fields
     are one step old or new. `different` samples have no explanation; `first_different_s` is the time of the first.
+    `overlay` has both sides of `COMMANDS`.
     """
 
     rows: int
@@ -94,15 +95,16 @@ class CommandCheck:
     stale: Mapping[str, int]
     different: int
     first_different_s: float | None
+    overlay: Overlay
 
     @property
     def passed(self) -> bool:
         return self.rows > 0 and not self.different
 
 
-def compare_commands(log: LoopLog, flown: Sequence[FlownGains]) -> tuple[CommandCheck, Overlay]:
+def compare_commands(log: LoopLog, flown: Sequence[FlownGains]) -> CommandCheck:
     """Compare ff_cmd, fb_cmd and thrust of every active sample with the values computed from the sample itself and the
-    gains flown then, of which at least one set is known. With both sides of `COMMANDS` for every active sample."""
+    gains flown then, of which at least one set is known."""
     sample = log.part(~log.idle)
     gains, r33 = _gains_of_rows(sample, flown), _r33(sample)
     replica = _replica_commands(sample, gains, r33)
@@ -117,7 +119,9 @@ def compare_commands(log: LoopLog, flown: Sequence[FlownGains]) -> tuple[Command
         stale[fields] = int(explained.sum())
         left &= ~explained
     tilted = exact & (r33 < loop.LEVEL)
-    check = CommandCheck(
+    recorded = {name: sample[name] for name in COMMANDS}
+    differs = {name: left & (replica[name] != recorded[name]) for name in COMMANDS}
+    return CommandCheck(
         rows=len(sample),
         exact=int(exact.sum()),
         tilted=int(tilted.sum()),
@@ -126,10 +130,8 @@ def compare_commands(log: LoopLog, flown: Sequence[FlownGains]) -> tuple[Command
         stale=stale,
         different=int(left.sum()),
         first_different_s=float(sample.time_s[left][0]) if left.any() else None,
+        overlay=Overlay(sample.time_s, recorded, replica, differs),
     )
-    recorded = {name: sample[name] for name in COMMANDS}
-    differs = {name: left & (replica[name] != recorded[name]) for name in COMMANDS}
-    return check, Overlay(sample.time_s, recorded, replica, differs)
 
 
 def flown_gains(log: LoopLog, candidates: Sequence[Gains]) -> list[FlownGains]:

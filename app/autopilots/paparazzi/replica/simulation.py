@@ -30,23 +30,25 @@ _MAX_STEPS: Final = loop.RATE_HZ * 120
 
 @dataclass(frozen=True, slots=True)
 class SimulationCheck:
-    """Largest differences between log and simulation over `duration_s` from the command on, as in `TOLERANCES`."""
+    """Largest differences between log and simulation over `duration_s` from the command on, as in `TOLERANCES`.
+
+    `overlay` has both sides of `SIMULATED` for every sample after the command, NaN where the integrator is not active.
+    """
 
     command_s: float
     duration_s: float
-    rows: int
     largest_difference: Mapping[str, float]
+    overlay: Overlay
 
     @property
     def passed(self) -> bool:
         return all(value <= TOLERANCES[name] for name, value in self.largest_difference.items())
 
 
-def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
+def compare_simulation(log: LoopLog) -> SimulationCheck | None:
     """Simulate the reference and the integrator from the first command that lasts two seconds.
 
-    None if there is none: the loop is active from the first sample on, never, or only briefly. With both sides of
-    `SIMULATED` for every sample after the command, NaN where the integrator is not active.
+    None if there is none: the loop is active from the first sample on, never, or only briefly.
     """
     found = _first_command(log)
     if found is None:
@@ -62,19 +64,18 @@ def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
     integrator = _simulated_integrator(part, reference[:, 0], steps)
     largest = max(float(np.abs(part["z_sum_err"][1:][np.isfinite(integrator)]).max(initial=0.0)), 1.0)
     outside["z_sum_err"] = np.nan_to_num(np.abs(part["z_sum_err"][1:] - integrator) / largest)
-    check = SimulationCheck(
-        command_s=float(part.time_s[0]) + offset_s,
-        duration_s=float(part.time_s[-1] - part.time_s[0]),
-        rows=len(part) - 1,
-        largest_difference={name: float(values.max()) for name, values in outside.items()},
-    )
     overlay = Overlay(
         part.time_s[1:],
         {name: part[name][1:] for name in SIMULATED},
         {**{name: reference[steps, place] for place, name in enumerate(UNITS)}, "z_sum_err": integrator},
         {name: values > TOLERANCES[name] for name, values in outside.items()},
     )
-    return check, overlay
+    return SimulationCheck(
+        command_s=float(part.time_s[0]) + offset_s,
+        duration_s=float(part.time_s[-1] - part.time_s[0]),
+        largest_difference={name: float(values.max()) for name, values in outside.items()},
+        overlay=overlay,
+    )
 
 
 def _first_command(log: LoopLog) -> tuple[int, int] | None:

@@ -45,7 +45,7 @@ class LoopTrace:
 
 
 @dataclass(frozen=True, slots=True)
-class Replay:
+class TraceReplay:
     """The replica's own outputs, shape (n, 6), with messages read when it fits the recording: in `late_rows` one row
     later than recorded; `armed_before` if the loop was armed one row before the first one."""
 
@@ -54,13 +54,13 @@ class Replay:
     armed_before: bool
 
 
-def replayed(trace: LoopTrace) -> Replay:
+def replayed(trace: LoopTrace) -> TraceReplay:
     """Run the replica from the inputs alone; the outputs decide when an undecided message was read."""
     runs = [_run(trace, armed_before=each) for each in (False, True)]
     return min(runs, key=lambda run: _misfit(run.outputs[:, loop.TAKEOFF], trace.outputs[:, loop.TAKEOFF]))
 
 
-def _run(trace: LoopTrace, *, armed_before: bool) -> Replay:
+def _run(trace: LoopTrace, *, armed_before: bool) -> TraceReplay:
     inputs, late = trace.inputs.astype(np.float32), trace.late_inputs.astype(np.float32)
     recorded = ~np.isnan(trace.outputs).all(axis=0)
     state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), loop.packed(trace.parameters, trace.filter_sample_s)
@@ -79,7 +79,7 @@ def _run(trace: LoopTrace, *, armed_before: bool) -> Replay:
         computed += [before, outputs]
         begin = row + 1
     computed.append(_after(state, packed, inputs[begin:])[1])
-    return Replay(np.concatenate(computed), tuple(late_rows), armed_before)
+    return TraceReplay(np.concatenate(computed), tuple(late_rows), armed_before)
 
 
 def _after(state: loop.State, packed: loop.Packed, inputs: NDArray[np.float32]) -> tuple[loop.State, Samples]:

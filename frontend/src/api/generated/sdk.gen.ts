@@ -2,7 +2,7 @@
 
 import { type Client, type ClientMeta, formDataBodySerializer, type Options as Options2, type RequestResult, type ServerSentEventsResult, type TDataShape } from './client';
 import { client } from './client.gen';
-import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, AddPhotoData, AddPhotoErrors, AddPhotoResponses, AnalyzeLogData, AnalyzeLogErrors, AnalyzeLogResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, BringInBundleData, BringInBundleErrors, BringInBundleResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckControllerData, CheckControllerErrors, CheckControllerResponses, CheckExampleControllerData, CheckExampleControllerErrors, CheckExampleControllerResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, CompareFlightsData, CompareFlightsErrors, CompareFlightsResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DeleteControllerCheckData, DeleteControllerCheckErrors, DeleteControllerCheckResponses, DeletePhotoData, DeletePhotoErrors, DeletePhotoResponses, DeleteVehicleData, DeleteVehicleErrors, DeleteVehicleResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EvaluateGateData, EvaluateGateErrors, EvaluateGateResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetAccessData, GetAccessErrors, GetAccessResponses, GetAddressCodeData, GetAddressCodeErrors, GetAddressCodeResponses, GetBackupData, GetBackupErrors, GetBackupResponses, GetBundleData, GetBundleErrors, GetBundleResponses, GetCalibrationData, GetCalibrationErrors, GetCalibrationResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetComparisonCsvData, GetComparisonCsvErrors, GetComparisonCsvResponses, GetComparisonFigureData, GetComparisonFigureErrors, GetComparisonFigureResponses, GetControllerCheckData, GetControllerCheckErrors, GetControllerCheckFigureData, GetControllerCheckFigureErrors, GetControllerCheckFigureResponses, GetControllerCheckResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobLogData, GetJobLogErrors, GetJobLogResponses, GetJobResponses, GetLandscapeData, GetLandscapeErrors, GetLandscapeResponses, GetPhotoData, GetPhotoErrors, GetPhotoResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReadinessData, GetReadinessErrors, GetReadinessResponses, GetReportAsPdfData, GetReportAsPdfErrors, GetReportAsPdfResponses, GetReportData, GetReportErrors, GetReportResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetSystemData, GetSystemErrors, GetSystemResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleFigureData, GetVehicleFigureErrors, GetVehicleFigureResponses, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, ImportFlightData, ImportFlightErrors, ImportFlightResponses, JudgeAbortData, JudgeAbortErrors, JudgeAbortResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListControllerChecksData, ListControllerChecksErrors, ListControllerChecksResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListPhotosData, ListPhotosErrors, ListPhotosResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, PredictGainsData, PredictGainsErrors, PredictGainsResponses, PromoteBestData, PromoteBestErrors, PromoteBestResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, RehearseCampaignData, RehearseCampaignErrors, RehearseCampaignResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, ReopenCampaignData, ReopenCampaignErrors, ReopenCampaignResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StartCampaignData, StartCampaignErrors, StartCampaignResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
+import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, AddPhotoData, AddPhotoErrors, AddPhotoResponses, AnalyzeLogData, AnalyzeLogErrors, AnalyzeLogResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, BringInBundleData, BringInBundleErrors, BringInBundleResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, CompareFlightsData, CompareFlightsErrors, CompareFlightsResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DeletePhotoData, DeletePhotoErrors, DeletePhotoResponses, DeleteVehicleData, DeleteVehicleErrors, DeleteVehicleResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EvaluateGateData, EvaluateGateErrors, EvaluateGateResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetAccessData, GetAccessErrors, GetAccessResponses, GetAddressCodeData, GetAddressCodeErrors, GetAddressCodeResponses, GetBackupData, GetBackupErrors, GetBackupResponses, GetBundleData, GetBundleErrors, GetBundleResponses, GetCalibrationData, GetCalibrationErrors, GetCalibrationResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetComparisonCsvData, GetComparisonCsvErrors, GetComparisonCsvResponses, GetComparisonFigureData, GetComparisonFigureErrors, GetComparisonFigureResponses, GetExampleAnalysisData, GetExampleAnalysisErrors, GetExampleAnalysisResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobLogData, GetJobLogErrors, GetJobLogResponses, GetJobResponses, GetLandscapeData, GetLandscapeErrors, GetLandscapeResponses, GetPhotoData, GetPhotoErrors, GetPhotoResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReadinessData, GetReadinessErrors, GetReadinessResponses, GetReportAsPdfData, GetReportAsPdfErrors, GetReportAsPdfResponses, GetReportData, GetReportErrors, GetReportResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetSystemData, GetSystemErrors, GetSystemResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleFigureData, GetVehicleFigureErrors, GetVehicleFigureResponses, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, ImportFlightData, ImportFlightErrors, ImportFlightResponses, JudgeAbortData, JudgeAbortErrors, JudgeAbortResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListPhotosData, ListPhotosErrors, ListPhotosResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, PredictGainsData, PredictGainsErrors, PredictGainsResponses, PromoteBestData, PromoteBestErrors, PromoteBestResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, RehearseCampaignData, RehearseCampaignErrors, RehearseCampaignResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, ReopenCampaignData, ReopenCampaignErrors, ReopenCampaignResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StartCampaignData, StartCampaignErrors, StartCampaignResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
 
 export type Options<TData extends TDataShape = TDataShape, ThrowOnError extends boolean = boolean, TResponse = unknown> = Options2<TData, ThrowOnError, TResponse> & {
     /**
@@ -690,63 +690,14 @@ export const runReproduction = <ThrowOnError extends boolean = false>(options: O
 export const getReproductionFigure = <ThrowOnError extends boolean = false>(options: Options<GetReproductionFigureData, ThrowOnError>): RequestResult<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError> => (options.client ?? client).get<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError>({ url: '/api/reproductions/{name}/figures/{figure}', ...options });
 
 /**
- * List Controller Checks
- *
- * Checks of recordings against the replica, newest first.
- */
-export const listControllerChecks = <ThrowOnError extends boolean = false>(options?: Options<ListControllerChecksData, ThrowOnError>): RequestResult<ListControllerChecksResponses, ListControllerChecksErrors, ThrowOnError> => (options?.client ?? client).get<ListControllerChecksResponses, ListControllerChecksErrors, ThrowOnError>({ url: '/api/controller-checks', ...options });
-
-/**
- * Check Controller
- *
- * Compare a recording of the vertical loop with the replica of its autopilot: Paparazzi's .data file with VERT_LOOP
- * (its .log as the form field `companion`), ArduCopter's .bin log, or a trace with a row for every step, .csv or
- * .csv.gz. The recording itself is not kept.
- */
-export const checkController = <ThrowOnError extends boolean = false>(options: Options<CheckControllerData, ThrowOnError>): RequestResult<CheckControllerResponses, CheckControllerErrors, ThrowOnError> => (options.client ?? client).post<CheckControllerResponses, CheckControllerErrors, ThrowOnError>({
-    ...formDataBodySerializer,
-    url: '/api/controller-checks',
-    ...options,
-    headers: {
-        'Content-Type': null,
-        ...options.headers
-    }
-});
-
-/**
- * Check Example Controller
- *
- * Check the example recording: a takeoff that comes with Gainline, recorded from the autopilot's own code.
- */
-export const checkExampleController = <ThrowOnError extends boolean = false>(options?: Options<CheckExampleControllerData, ThrowOnError>): RequestResult<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError> => (options?.client ?? client).post<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError>({ url: '/api/controller-checks/example', ...options });
-
-/**
- * Delete Controller Check
- *
- * Delete a check; it can be repeated from its recording.
- */
-export const deleteControllerCheck = <ThrowOnError extends boolean = false>(options: Options<DeleteControllerCheckData, ThrowOnError>): RequestResult<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError> => (options.client ?? client).delete<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}', ...options });
-
-/**
- * Get Controller Check
- */
-export const getControllerCheck = <ThrowOnError extends boolean = false>(options: Options<GetControllerCheckData, ThrowOnError>): RequestResult<GetControllerCheckResponses, GetControllerCheckErrors, ThrowOnError> => (options.client ?? client).get<GetControllerCheckResponses, GetControllerCheckErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}', ...options });
-
-/**
- * Get Controller Check Figure
- *
- * The signals of the reference model and the integrator, or the commands; recording and replica overlaid.
- */
-export const getControllerCheckFigure = <ThrowOnError extends boolean = false>(options: Options<GetControllerCheckFigureData, ThrowOnError>): RequestResult<GetControllerCheckFigureResponses, GetControllerCheckFigureErrors, ThrowOnError> => (options.client ?? client).get<GetControllerCheckFigureResponses, GetControllerCheckFigureErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}/figures/{name}', ...options });
-
-/**
  * Analyze Log
  *
- * Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains.
+ * Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains; and how well the replica of
+ * the autopilot's vertical loop explains it. Where only one of both is possible, the other says why not.
  *
  * ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, a .tlog of altitude steps under either, or
- * Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m. Takes some seconds;
- * nothing is stored.
+ * Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m; or a trace of the
+ * vertical loop with a row for every step, .csv or .csv.gz. Takes some seconds; nothing is stored.
  */
 export const analyzeLog = <ThrowOnError extends boolean = false>(options: Options<AnalyzeLogData, ThrowOnError>): RequestResult<AnalyzeLogResponses, AnalyzeLogErrors, ThrowOnError> => (options.client ?? client).post<AnalyzeLogResponses, AnalyzeLogErrors, ThrowOnError>({
     ...formDataBodySerializer,
@@ -757,6 +708,13 @@ export const analyzeLog = <ThrowOnError extends boolean = false>(options: Option
         ...options.headers
     }
 });
+
+/**
+ * Get Example Analysis
+ *
+ * Analyse the example: a takeoff that comes with Gainline, recorded from the autopilot's own code.
+ */
+export const getExampleAnalysis = <ThrowOnError extends boolean = false>(options?: Options<GetExampleAnalysisData, ThrowOnError>): RequestResult<GetExampleAnalysisResponses, GetExampleAnalysisErrors, ThrowOnError> => (options?.client ?? client).get<GetExampleAnalysisResponses, GetExampleAnalysisErrors, ThrowOnError>({ url: '/api/log-analyses/example', ...options });
 
 /**
  * Start Campaign

@@ -179,18 +179,6 @@ export type AutopilotInfo = {
      * usual address of a simulated one
      */
     simulated_address: string;
-    /**
-     * Recordings
-     *
-     * what the controller check takes of it
-     */
-    recordings: string;
-    /**
-     * Recording Types
-     *
-     * file types of these
-     */
-    recording_types: Array<string>;
 };
 
 /**
@@ -660,22 +648,6 @@ export type Check = {
 };
 
 /**
- * CheckFigure
- *
- * An available figure of the check.
- */
-export type CheckFigure = {
-    /**
-     * Name
-     */
-    name: 'reference' | 'commands';
-    /**
-     * Title
-     */
-    title: string;
-};
-
-/**
  * CheckItem
  *
  * Result of one preflight check: what was found, what is required, and what to do if they differ.
@@ -921,111 +893,6 @@ export type Control = {
      * Until
      */
     until: string;
-};
-
-/**
- * ControllerCheck
- *
- * The result as a sentence, the gains and notes behind it, and one line for each signal.
- */
-export type ControllerCheck = {
-    /**
-     * Id
-     */
-    id: number;
-    /**
-     * File Name
-     */
-    file_name: string;
-    /**
-     * Kind
-     */
-    kind: 'log' | 'trace';
-    /**
-     * Passed
-     */
-    passed: boolean;
-    /**
-     * Checked At
-     */
-    checked_at: string;
-    /**
-     * Autopilot
-     *
-     * the autopilot whose replica was used
-     */
-    autopilot: string;
-    /**
-     * Sentence
-     */
-    sentence: string;
-    /**
-     * Rows
-     *
-     * number of samples or steps compared
-     */
-    rows: number;
-    /**
-     * Gains
-     *
-     * null if they change within the recording
-     */
-    gains: {
-        [key: string]: number | number;
-    } | null;
-    /**
-     * Gains From
-     */
-    gains_from: string;
-    /**
-     * Better Gains
-     *
-     * other gains that reproduce more of the commands
-     */
-    better_gains: {
-        [key: string]: number | number;
-    } | null;
-    /**
-     * Notes
-     */
-    notes: Array<string>;
-    /**
-     * Signals
-     */
-    signals: Array<SignalResult>;
-    /**
-     * Figures
-     */
-    figures: Array<CheckFigure>;
-};
-
-/**
- * ControllerCheckSummary
- *
- * A recording that was compared with the replica of its autopilot's loop: `log`, of a flight, or `trace`, with
- * every step.
- */
-export type ControllerCheckSummary = {
-    /**
-     * Id
-     */
-    id: number;
-    /**
-     * File Name
-     */
-    file_name: string;
-    /**
-     * Kind
-     */
-    kind: 'log' | 'trace';
-    /**
-     * Passed
-     */
-    passed: boolean;
-    /**
-     * Checked At
-     */
-    checked_at: string;
 };
 
 /**
@@ -2009,22 +1876,6 @@ export type GainsPrediction = {
 };
 
 /**
- * GainsTable
- *
- * Gain sets compared, in words: the sets flown, the proposed one, and others.
- */
-export type GainsTable = {
-    /**
-     * Columns
-     */
-    columns: Array<string>;
-    /**
-     * Rows
-     */
-    rows: Array<Array<string>>;
-};
-
-/**
  * Gate
  *
  * The gate's result for a gain set before its flight.
@@ -2454,58 +2305,22 @@ export type LogAnalysis = {
      */
     autopilot: string;
     /**
-     * Answer
+     * Tuning
      */
-    answer: string;
+    tuning: TuningAnswer | Refusal;
     /**
-     * Proposes
-     *
-     * whether gains are proposed; if not, `answer` says why
+     * Replica
      */
-    proposes: boolean;
-    /**
-     * Starts Campaign
-     *
-     * whether a campaign can start from this log
-     */
-    starts_campaign: boolean;
-    /**
-     * Experiment
-     *
-     * of this campaign, for a vehicle that flies it; null: the vehicle is flown elsewhere
-     */
-    experiment: string | null;
-    /**
-     * Flight
-     *
-     * how the altitude was controlled
-     */
-    flight: Array<string>;
-    /**
-     * Vehicle
-     *
-     * the fitted vehicle
-     */
-    vehicle: Array<string>;
-    gains: GainsTable;
-    /**
-     * Notes
-     *
-     * how to read the table, and precautions
-     */
-    notes: Array<string>;
-    parameter_file: ParameterFile | null;
-    /**
-     * Numbers
-     */
-    numbers: ManoeuvreNumbers | TakeoffNumbers;
+    replica: ReplicaAnswer | Refusal;
     /**
      * Figures
      *
-     * by theme
+     * by theme, of each part
      */
     figures: {
-        [key: string]: Card;
+        [key: string]: {
+            [key: string]: Array<Card>;
+        };
     };
 };
 
@@ -2825,24 +2640,6 @@ export type PageCampaignSummary = {
 };
 
 /**
- * Page[ControllerCheckSummary]
- */
-export type PageControllerCheckSummary = {
-    /**
-     * Items
-     */
-    items: Array<ControllerCheckSummary>;
-    /**
-     * Total
-     */
-    total: number;
-    /**
-     * Next Cursor
-     */
-    next_cursor: string | null;
-};
-
-/**
  * Page[GivenGains]
  */
 export type PageGivenGains = {
@@ -3004,6 +2801,29 @@ export type PresetInfo = {
 };
 
 /**
+ * ProblemField
+ *
+ * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
+ * pass, by name, where any are known.
+ */
+export type ProblemField = {
+    /**
+     * Field
+     */
+    field: string;
+    /**
+     * Reason
+     */
+    reason: string;
+    /**
+     * Offer
+     */
+    offer?: {
+        [key: string]: number | number;
+    };
+};
+
+/**
  * Promotion
  *
  * Who makes the best gains the vehicle's safe gains, and why; `version` is the vehicle's.
@@ -3130,6 +2950,26 @@ export type RecordBrief = {
 };
 
 /**
+ * Refusal
+ *
+ * Why the log does not answer: what happened, the fields concerned, and what to do.
+ */
+export type Refusal = {
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Hint
+     */
+    hint: string;
+    /**
+     * Problems
+     */
+    problems: Array<ProblemField>;
+};
+
+/**
  * Rehearsal
  *
  * Whether a campaign on a real vehicle was first flown on a simulation, which has to be `passed` before a trial can
@@ -3217,6 +3057,82 @@ export type RepeatGroup = {
      * Is Best
      */
     is_best: boolean;
+};
+
+/**
+ * ReplicaAnswer
+ *
+ * How well Gainline's replica of the autopilot's vertical loop explains the log.
+ */
+export type ReplicaAnswer = {
+    /**
+     * Answer
+     */
+    answer: string;
+    /**
+     * Agrees
+     *
+     * whether every signal does
+     */
+    agrees: boolean;
+    /**
+     * Kind
+     *
+     * the log of a flight, or a trace with every step
+     */
+    kind: 'log' | 'trace';
+    /**
+     * Facts
+     *
+     * what was compared, and the gains
+     */
+    facts: Array<string>;
+    /**
+     * the difference of every signal
+     */
+    table: TextTable;
+    /**
+     * Notes
+     *
+     * what is allowed, and how it was compared
+     */
+    notes: Array<string>;
+    /**
+     * Rows
+     *
+     * number of samples or steps compared
+     */
+    rows: number;
+    /**
+     * First Different Row
+     *
+     * counted from 0; null: none, or not counted
+     */
+    first_different_row: number | null;
+    /**
+     * Gains
+     *
+     * null if they change within the recording
+     */
+    gains: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Gains From
+     */
+    gains_from: string;
+    /**
+     * Better Gains
+     *
+     * other gains that reproduce more of the commands
+     */
+    better_gains: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Signals
+     */
+    signals: Array<SignalResult>;
 };
 
 /**
@@ -3473,7 +3389,7 @@ export type SignalResult = {
     /**
      * Median Difference
      */
-    median_difference: number | null;
+    median_difference?: number | null;
 };
 
 /**
@@ -3818,6 +3734,22 @@ export type TakeoffNumbers = {
      */
     assessments: Array<GainsInTakeoff>;
     proposed: GainsInTakeoff | null;
+};
+
+/**
+ * TextTable
+ *
+ * A table of formatted cells.
+ */
+export type TextTable = {
+    /**
+     * Columns
+     */
+    columns: Array<string>;
+    /**
+     * Rows
+     */
+    rows: Array<Array<string>>;
 };
 
 /**
@@ -4284,6 +4216,63 @@ export type Trouble = {
 };
 
 /**
+ * TuningAnswer
+ *
+ * How the altitude was controlled, the fitted vehicle, and better gains.
+ */
+export type TuningAnswer = {
+    /**
+     * Answer
+     */
+    answer: string;
+    /**
+     * Proposes
+     *
+     * whether gains are proposed; if not, `answer` says why
+     */
+    proposes: boolean;
+    /**
+     * Starts Campaign
+     *
+     * whether a campaign can start from this log
+     */
+    starts_campaign: boolean;
+    /**
+     * Experiment
+     *
+     * of this campaign, for a vehicle that flies it; null: the vehicle is flown elsewhere
+     */
+    experiment: string | null;
+    /**
+     * Flight
+     *
+     * how the altitude was controlled
+     */
+    flight: Array<string>;
+    /**
+     * Vehicle
+     *
+     * the fitted vehicle
+     */
+    vehicle: Array<string>;
+    /**
+     * the sets flown, the proposed one, and others
+     */
+    gains: TextTable;
+    /**
+     * Notes
+     *
+     * how to read the table, and precautions
+     */
+    notes: Array<string>;
+    parameter_file: ParameterFile | null;
+    /**
+     * Numbers
+     */
+    numbers: ManoeuvreNumbers | TakeoffNumbers;
+};
+
+/**
  * Vehicle
  *
  * Something that can fly a trial. `concern` states why it is quarantined; `held` are the gains that it reported at
@@ -4653,29 +4642,6 @@ export type Winner = {
      * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
      */
     verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
-};
-
-/**
- * ProblemField
- *
- * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
- * pass, by name, where any are known.
- */
-export type ProblemField = {
-    /**
-     * Field
-     */
-    field: string;
-    /**
-     * Reason
-     */
-    reason: string;
-    /**
-     * Offer
-     */
-    offer?: {
-        [key: string]: number | number;
-    };
 };
 
 /**
@@ -7408,45 +7374,7 @@ export type GetReproductionFigureResponses = {
 
 export type GetReproductionFigureResponse = GetReproductionFigureResponses[keyof GetReproductionFigureResponses];
 
-export type ListControllerChecksData = {
-    body?: never;
-    path?: never;
-    query?: {
-        /**
-         * Limit
-         *
-         * maximum number of items on the page
-         */
-        limit?: number;
-        /**
-         * Cursor
-         *
-         * `next_cursor` of the previous page
-         */
-        cursor?: string | null;
-    };
-    url: '/api/controller-checks';
-};
-
-export type ListControllerChecksErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type ListControllerChecksError = ListControllerChecksErrors[keyof ListControllerChecksErrors];
-
-export type ListControllerChecksResponses = {
-    /**
-     * Successful Response
-     */
-    200: PageControllerCheckSummary;
-};
-
-export type ListControllerChecksResponse = ListControllerChecksResponses[keyof ListControllerChecksResponses];
-
-export type CheckControllerData = {
+export type AnalyzeLogData = {
     body: {
         file: Blob | File;
         /**
@@ -7469,181 +7397,8 @@ export type CheckControllerData = {
          *
          * KP,KI,KD flown, if the log does not contain them
          */
-        gains?: string | null;
+        gains?: string;
     };
-    url: '/api/controller-checks';
-};
-
-export type CheckControllerErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type CheckControllerError = CheckControllerErrors[keyof CheckControllerErrors];
-
-export type CheckControllerResponses = {
-    /**
-     * Successful Response
-     */
-    201: ControllerCheck;
-};
-
-export type CheckControllerResponse = CheckControllerResponses[keyof CheckControllerResponses];
-
-export type CheckExampleControllerData = {
-    body?: never;
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
-         */
-        'Idempotency-Key'?: string | null;
-    };
-    path?: never;
-    query?: never;
-    url: '/api/controller-checks/example';
-};
-
-export type CheckExampleControllerErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type CheckExampleControllerError = CheckExampleControllerErrors[keyof CheckExampleControllerErrors];
-
-export type CheckExampleControllerResponses = {
-    /**
-     * Successful Response
-     */
-    201: ControllerCheck;
-};
-
-export type CheckExampleControllerResponse = CheckExampleControllerResponses[keyof CheckExampleControllerResponses];
-
-export type DeleteControllerCheckData = {
-    body?: never;
-    path: {
-        /**
-         * Check Id
-         */
-        check_id: number;
-    };
-    query?: never;
-    url: '/api/controller-checks/{check_id}';
-};
-
-export type DeleteControllerCheckErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type DeleteControllerCheckError = DeleteControllerCheckErrors[keyof DeleteControllerCheckErrors];
-
-export type DeleteControllerCheckResponses = {
-    /**
-     * Successful Response
-     */
-    204: void;
-};
-
-export type DeleteControllerCheckResponse = DeleteControllerCheckResponses[keyof DeleteControllerCheckResponses];
-
-export type GetControllerCheckData = {
-    body?: never;
-    path: {
-        /**
-         * Check Id
-         */
-        check_id: number;
-    };
-    query?: never;
-    url: '/api/controller-checks/{check_id}';
-};
-
-export type GetControllerCheckErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type GetControllerCheckError = GetControllerCheckErrors[keyof GetControllerCheckErrors];
-
-export type GetControllerCheckResponses = {
-    /**
-     * Successful Response
-     */
-    200: ControllerCheck;
-};
-
-export type GetControllerCheckResponse = GetControllerCheckResponses[keyof GetControllerCheckResponses];
-
-export type GetControllerCheckFigureData = {
-    body?: never;
-    path: {
-        /**
-         * Check Id
-         */
-        check_id: number;
-        /**
-         * Name
-         */
-        name: 'reference' | 'commands';
-    };
-    query?: {
-        /**
-         * Theme
-         *
-         * colours for a light or a dark page
-         */
-        theme?: 'light' | 'dark';
-    };
-    url: '/api/controller-checks/{check_id}/figures/{name}';
-};
-
-export type GetControllerCheckFigureErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type GetControllerCheckFigureError = GetControllerCheckFigureErrors[keyof GetControllerCheckFigureErrors];
-
-export type GetControllerCheckFigureResponses = {
-    /**
-     * Successful Response
-     */
-    200: Card;
-};
-
-export type GetControllerCheckFigureResponse = GetControllerCheckFigureResponses[keyof GetControllerCheckFigureResponses];
-
-export type AnalyzeLogData = {
-    body: {
-        file: Blob | File;
-        /**
-         * the .log file that Paparazzi writes next to a .data file
-         */
-        companion?: Blob | File;
-    };
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
-         */
-        'Idempotency-Key'?: string | null;
-    };
-    path?: never;
-    query?: never;
     url: '/api/log-analyses';
 };
 
@@ -7664,6 +7419,31 @@ export type AnalyzeLogResponses = {
 };
 
 export type AnalyzeLogResponse = AnalyzeLogResponses[keyof AnalyzeLogResponses];
+
+export type GetExampleAnalysisData = {
+    body?: never;
+    path?: never;
+    query?: never;
+    url: '/api/log-analyses/example';
+};
+
+export type GetExampleAnalysisErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetExampleAnalysisError = GetExampleAnalysisErrors[keyof GetExampleAnalysisErrors];
+
+export type GetExampleAnalysisResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogAnalysis;
+};
+
+export type GetExampleAnalysisResponse = GetExampleAnalysisResponses[keyof GetExampleAnalysisResponses];
 
 export type StartCampaignData = {
     body: {

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.loop_check import ardupilot_loop_log
 from app.autopilots.ardupilot.replica.replay import SHAPED, LoopLog, replica_of
+from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from tests.logs.recorded import recorded
 
 COMPARED = (*SHAPED, "v_t_m_s", "throttle")

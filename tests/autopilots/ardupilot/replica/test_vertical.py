@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.ardupilot.loop_check import read_ardupilot_trace
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
 from app.autopilots.ardupilot.replica.vertical import (
@@ -39,6 +38,7 @@ from app.autopilots.ardupilot.replica.vertical import (
 from app.autopilots.ardupilot.replica.vertical import (
     packed as constants_of,
 )
+from app.autopilots.ardupilot.replica_check import read_ardupilot_trace
 
 TRACES = sorted((Path(__file__).parents[3] / "data" / "ardupilot_loop").glob("*.csv.gz"))
 TOLERANCES = np.array([1e-5, 2e-6, 1.2e-5, 4e-5, 1e-4, 0.01, 5e-5, 2e-5])

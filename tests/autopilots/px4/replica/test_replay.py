@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.autopilots.px4.loop_check import read_px4_trace
 from app.autopilots.px4.replica.replay import LoopLog, replica_of
 from app.autopilots.px4.replica.vertical import FLIGHT, INPUTS, OUTPUTS
+from app.autopilots.px4.replica_check import read_px4_trace
 from app.core.records.trajectory import Samples
 
 FLIGHTS = Path(__file__).parents[3] / "data" / "px4_loop"

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.px4.loop_check import read_px4_trace
 from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.replay import LoopTrace, replayed
 from app.autopilots.px4.replica.vertical import (
@@ -37,6 +36,7 @@ from app.autopilots.px4.replica.vertical import (
 from app.autopilots.px4.replica.vertical import (
     packed as constants_of,
 )
+from app.autopilots.px4.replica_check import read_px4_trace
 from app.core.records.trajectory import Samples
 
 DATA = Path(__file__).parents[3] / "data" / "px4_loop"

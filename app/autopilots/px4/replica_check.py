@@ -1,4 +1,4 @@
-"""PX4's entry in the registry: its on-board log, and traces of the loop alone or of a flight: described CSV, one row
+"""PX4's loop beside its replica: its on-board log, and traces of the loop alone or of a flight: described CSV, one row
 per estimate of position (`trace_table`)."""
 
 from collections.abc import Iterable, Mapping
@@ -10,26 +10,24 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.loop_check import (
-    Kind,
-    LoopCheck,
-    Result,
-    Signal,
-    SignalResult,
-    TraceReplay,
-    Upload,
-    grouped,
-    replay_of_log,
-    result_of_trace,
-)
-from app.autopilots.px4.log import SOURCES, TARGET, read_px4
+from app.autopilots.px4.log import SOURCES, TARGET
 from app.autopilots.px4.replica.parameters import DEFAULTS, STEP_S, UNSUPPORTED, Parameters, parameters_from
-from app.autopilots.px4.replica.replay import LoopLog, LoopTrace, Replay, replayed, replica_of
+from app.autopilots.px4.replica.replay import LoopLog, LoopTrace, TraceReplay, replayed, replica_of
 from app.autopilots.px4.replica.vertical import FLIGHT, HOVER_MAX, HOVER_MIN, INPUTS, OUTPUTS, RAMP_UP
 from app.autopilots.recording import Recording, refusal
+from app.autopilots.replica_check import (
+    Kind,
+    LoopReplica,
+    Replay,
+    ReplicaCheck,
+    Signal,
+    SignalResult,
+    check_replay,
+    grouped,
+    replay_of_log,
+)
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
-from app.logs.formats import Format
 from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 
 _TOLERANCE: Final = 1e-5
@@ -91,30 +89,32 @@ _TRACE_HINT: Final = (
 )
 
 
-def _examine_log(upload: Upload) -> Result:
-    log = px4_loop_log(read_px4(upload.stream), name=upload.name)
+def _check_log(recording: Recording, name: str, _given: str) -> ReplicaCheck:
+    log = px4_loop_log(recording, name=name)
     time_s = log.time_s[log.place]
-    compared = replay_of_log(log, replica_of(log), time_s, gains=log.parameters.gains, notes=_log_notes)
-    if not compared.recorded:
+    replay = replay_of_log(log, replica_of(log), time_s, gains=log.parameters.gains, notes=_log_notes)
+    if not replay.recorded:
         raise InputError(
-            f"{upload.name} cannot be compared with the replica.",
+            f"{name} cannot be compared with the replica.",
             hint="Give a .ulg log with hover_thrust_estimate and trajectory_setpoint (bit 0 of SDLOG_PROFILE).",
             problems=(Problem("file", "has no set-point and no hover thrust beside any row in flight"),),
         )
-    return _judged_by_medians(compared, _LOG_MEDIANS, kind="log")
+    return _judged_by_medians(replay, _LOG_MEDIANS, kind="log")
 
 
-def _examine_trace(upload: Upload) -> Result:
-    trace = read_px4_trace(upload.stream, name=upload.name)
+def _check_trace(stream: BinaryIO, name: str) -> ReplicaCheck:
+    trace = read_px4_trace(stream, name=name)
     computed = replayed(trace)
-    replay = TraceReplay(
+    replay = Replay(
         time_s=trace.time_s,
         recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
         replica=dict(zip(OUTPUTS, computed.outputs.T, strict=True)),
         gains=trace.parameters.gains,
         notes=(*_order_notes(computed), _DOWN),
     ).compared
-    return _judged_by_medians(replay, _MEDIANS, kind="trace") if trace.flown else result_of_trace(_SIGNALS, replay)
+    if trace.flown:
+        return _judged_by_medians(replay, _MEDIANS, kind="trace")
+    return check_replay(_SIGNALS, replay, kind="trace")
 
 
 def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
@@ -158,7 +158,7 @@ def _late(table: TraceTable, inputs: Samples) -> Samples:
     return np.where(may_be_late, np.concatenate([inputs[:1], inputs[:-1]]), inputs)
 
 
-def _order_notes(replay: Replay) -> Iterable[str]:
+def _order_notes(replay: TraceReplay) -> Iterable[str]:
     if replay.late_rows:
         rows = ", ".join(map(str, replay.late_rows))
         yield f"The recording fits if the set-point or flag that changed in these rows was read one row later: {rows}."
@@ -176,10 +176,10 @@ def _log_notes(rows: Mapping[str, int]) -> Iterable[str]:
     yield _DOWN
 
 
-def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kind: Kind) -> Result:
+def _judged_by_medians(replay: Replay, medians: Mapping[str, float], *, kind: Kind) -> ReplicaCheck:
     """The result of a flight; rows beyond what a median may be are marked, and decide nothing."""
     limited = {name: replace(each, tolerance=medians.get(name, each.tolerance)) for name, each in _SIGNALS.items()}
-    result = result_of_trace(limited, replay, kind=kind)
+    result = check_replay(limited, replay, kind=kind)
     signals = tuple(_judged(signal, replay) for signal in result.signals if signal.name in medians)
     differing = [signal.name for signal in signals if signal.verdict == "differs"]
     total = grouped(result.rows)
@@ -198,7 +198,7 @@ def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kin
     )
 
 
-def _judged(signal: SignalResult, replay: TraceReplay) -> SignalResult:
+def _judged(signal: SignalResult, replay: Replay) -> SignalResult:
     """The signal judged by its median difference over the rows with a value; where only one side has one, they are
     infinitely apart in the median, and left out of the largest difference."""
     recorded, computed = replay.recorded[signal.name], replay.replica[signal.name]
@@ -308,19 +308,14 @@ def _hover(recording: Recording, time_s: Samples, takeoff: Samples, parameters: 
     return np.where(takeoff < FLIGHT, on_ground, in_flight)
 
 
-CHECK: Final = LoopCheck(
-    recordings="PX4's .ulg log of a flight, or a trace of its vertical loop with one row per estimate of position, "
-    ".csv or .csv.gz",
+REPLICA: Final = LoopReplica(
     signals=_SIGNALS,
-    figures=MappingProxyType(
-        {
-            "reference": ("Takeoff and velocity target", ("takeoff_state", "ramp_m_s", "out_vz_m_s")),
-            "commands": ("Controller and thrust", ("out_vz_derivative", "out_az_m_s2", "out_thrust")),
-        }
+    figures=(
+        ("Takeoff and velocity target", ("takeoff_state", "ramp_m_s", "out_vz_m_s")),
+        ("Controller and thrust", ("out_vz_derivative", "out_az_m_s2", "out_thrust")),
     ),
     note=_DOWN,
-    log=Format.ULOG,
+    check_log=_check_log,
     is_trace=partial(has_columns, columns=COLUMNS),
-    examine_log=_examine_log,
-    examine_trace=_examine_trace,
+    check_trace=_check_trace,
 )

@@ -1,26 +1,27 @@
-"""A recorded control loop compared with its replica, as plain data for storage: sentences, one line for each signal,
-and curves; and what the check must know of an autopilot."""
+"""A recorded control loop compared with its replica: a sentence, one line for each signal, and what to draw; and what
+the check must know of an autopilot."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import BinaryIO, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.records.trajectory import Overlaid, Overlay, Samples, select_samples
-from app.logs.formats import Format
+from app.autopilots.recording import Recording
+from app.core.formatting import grouped as grouped_by
+from app.core.policy import Gains
+from app.core.records.trajectory import Overlay, Samples
 
 Kind = Literal["log", "trace"]
 Verdict = Literal["exact", "agrees", "differs"]
-FigureName = Literal["reference", "commands"]
 Values = NDArray[np.int64] | Samples
 
 _ROWS: Final[Mapping[Kind, str]] = MappingProxyType({"log": "logged rows", "trace": "steps"})
 
-CURVE_POINTS: Final = 1000
-MARKS: Final = 200
+grouped = partial(grouped_by, separator="\N{NARROW NO-BREAK SPACE}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,76 +63,60 @@ class SignalResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """Everything that a page shows of one check.
+class ReplicaCheck:
+    """How well a replica explains a recording: the log of a flight, or a trace with every step.
 
-    `better_gains` are other gains from which more of the commands follow; `first_different_row` counts the rows of a
-    trace from 0; `autopilot` is the name of an entry of the registry.
+    `gains` is None if they change; `better_gains` are other gains from which more of the commands follow;
+    `first_different_row` counts the rows from 0; each of the `overlays` has signals of common samples.
     """
 
     kind: Kind
     passed: bool
     sentence: str
     rows: int
-    gains: Mapping[str, float] | None
+    gains: Gains | None
     gains_from: str
-    better_gains: Mapping[str, float] | None
-    notes: tuple[str, ...]
-    signals: tuple[SignalResult, ...]
-    curves: Mapping[str, Overlaid]
-    autopilot: str = "paparazzi"
+    better_gains: Gains | None = None
+    notes: Sequence[str]
+    signals: Sequence[SignalResult]
+    overlays: Sequence[Overlay]
     first_different_row: int | None = None
 
-    def as_json(self) -> dict[str, object]:
-        return asdict(self)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Upload:
-    """A file to examine: its content and name, the file that was written beside it, and gains that a person gave."""
+class LoopReplica:
+    """An autopilot's vertical loop that has a replica, and the comparison with its recordings.
 
-    stream: BinaryIO
-    name: str
-    companion: BinaryIO | None = None
-    given: Mapping[str, float] | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoopCheck:
-    """The check of an autopilot whose vertical loop has a replica.
-
-    `recordings` completes the sentence “Give …”; `figures` holds a title and the signals one below another for each
-    figure that its recordings have; `note` is what a reader of its signals must know. `log` is the format of its own
-    log; `is_trace` says whether a file with these first bytes is a recorded run of its loop. `examine_log`
-    and `examine_trace` compare them with the replica and raise InputError that names what cannot be read.
+    `figures` holds a title and the signals one below another; `note` is what a reader of its signals must know.
+    `check_log` compares a recording in the file of that name, with the gains that a person gave, if any, as text;
+    `is_trace` says whether a file with these first bytes is a recorded run of the loop, which `check_trace` compares.
+    Both raise InputError that names what is missing, or cannot be read: `gains` if a person has to give them.
     """
 
-    recordings: str
     signals: Signals
-    figures: Mapping[FigureName, tuple[str, tuple[str, ...]]]
+    figures: Sequence[tuple[str, Sequence[str]]]
     note: str
-    log: Format
+    check_log: Callable[[Recording, str, str], ReplicaCheck]
     is_trace: Callable[[bytes], bool]
-    examine_log: Callable[[Upload], Result]
-    examine_trace: Callable[[Upload], Result]
+    check_trace: Callable[[BinaryIO, str], ReplicaCheck]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TraceReplay:
-    """A trace and what the replica computed from the same inputs.
+class Replay:
+    """Rows of a recording and what the replica computed from the same inputs.
 
     `time_s` has shape (n,), n ≥ 1; `recorded` and `replica` hold each signal by name, shape (n,). `gains` is None if
-    they change within the trace.
+    they change within the rows.
     """
 
     time_s: Samples
     recorded: Mapping[str, Values]
     replica: Mapping[str, Values]
-    gains: Mapping[str, float] | None
-    notes: tuple[str, ...] = field(default=())
+    gains: Gains | None
+    notes: Sequence[str] = field(default=())
 
     @property
-    def compared(self) -> "TraceReplay":
+    def compared(self) -> "Replay":
         """Of the signals that have a value in any row."""
         names = [name for name, values in self.recorded.items() if np.isfinite(values).any()]
         recorded, replica = ({name: values[name] for name in names} for values in (self.recorded, self.replica))
@@ -143,39 +128,38 @@ def replay_of_log(
     replica: Mapping[str, Samples],
     time_s: Samples,
     *,
-    gains: Mapping[str, float],
+    gains: Gains,
     notes: Callable[[Mapping[str, int]], Iterable[str]],
-) -> TraceReplay:
+) -> Replay:
     """The rows of a log, which has each signal of the replica, at their times, shape (n,), where the replica has a
     value. `notes` are made of the number of these rows for each signal."""
     recorded = {name: np.where(np.isfinite(values), getattr(log, name), np.nan) for name, values in replica.items()}
     rows = {name: int(np.isfinite(values).sum()) for name, values in recorded.items()}
-    return TraceReplay(
+    return Replay(
         time_s=time_s - time_s[0], recorded=recorded, replica=replica, gains=gains, notes=tuple(notes(rows))
     ).compared
 
 
-def result_of_trace(signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
+def check_replay(signals: Signals, replay: Replay, *, kind: Kind) -> ReplicaCheck:
     """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
     apart = {name: _apart(replay.recorded[name], replay.replica[name]) for name in replay.recorded}
     differs = {name: ~(values <= signals[name].tolerance) for name, values in apart.items()}
     overlay = Overlay(replay.time_s, replay.recorded, replay.replica, differs)
     rows = np.flatnonzero(np.logical_or.reduce(list(differs.values())))
-    results = tuple(
+    results = [
         signal_result(name, signals[name], overlay, largest_difference=float(values.max()))
         for name, values in apart.items()
-    )
-    return Result(
+    ]
+    return ReplicaCheck(
         kind=kind,
         passed=rows.size == 0,
-        sentence=_trace_sentence(results, overlay, rows, _ROWS[kind]),
+        sentence=_sentence(results, overlay, rows, _ROWS[kind]),
         rows=len(replay.time_s),
         gains=replay.gains,
         gains_from="not constant" if replay.gains is None else "of the recording",
-        better_gains=None,
         notes=replay.notes,
         signals=results,
-        curves=curves(signals, (overlay,)),
+        overlays=(overlay,),
         first_different_row=int(rows[0]) if rows.size else None,
     )
 
@@ -196,19 +180,6 @@ def signal_result(name: str, signal: Signal, overlay: Overlay, *, largest_differ
     )
 
 
-def curves(signals: Signals, overlays: Iterable[Overlay]) -> dict[str, Overlaid]:
-    return {
-        name: _curve(name, signals[name], overlay)
-        for overlay in overlays
-        for name in overlay.recorded
-        if len(overlay.time_s)
-    }
-
-
-def grouped(count: int) -> str:
-    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
-
-
 def _apart(recorded: Values, replica: Values) -> Samples:
     """|recorded − replica|, shape (n,); infinite where only one of them is NaN."""
     apart: Samples = np.abs(np.asarray(recorded - replica, dtype=np.float64))
@@ -217,45 +188,16 @@ def _apart(recorded: Values, replica: Values) -> Samples:
     return apart
 
 
-def _trace_sentence(results: tuple[SignalResult, ...], overlay: Overlay, rows: NDArray[np.int64], unit: str) -> str:
+def _sentence(results: Sequence[SignalResult], overlay: Overlay, rows: NDArray[np.int64], unit: str) -> str:
     total = grouped(len(overlay.time_s))
     exact = all(signal.tolerance == 0.0 for signal in results)
     met = "exact" if exact else "within the tolerances"
     if not rows.size:
-        return f"The replica agrees: all {total} {unit} are {met} in all {len(results)} signals."
+        where = f"all {len(results)} signals" if len(results) > 1 else results[0].name
+        return f"The replica agrees: all {total} {unit} are {met} in {where}."
     names = ", ".join(name for name, wrong in overlay.differs.items() if wrong[rows[0]])
     verb = "is" if len(rows) == 1 else "are"
     return (
         f"The replica differs: {grouped(len(rows))} of {total} {unit} {verb} not {met}, the first at "
         f"{overlay.time_s[rows[0]]:.3f} s in {names}."
     )
-
-
-def _curve(name: str, signal: Signal, overlay: Overlay) -> Overlaid:
-    """Curves of a signal, thinned to common times such that both keep their shape and extremes."""
-    known = np.flatnonzero(np.isfinite(overlay.recorded[name]) & np.isfinite(overlay.replica[name]))
-    recorded, replica = (
-        np.asarray(values[known], dtype=np.float64) * signal.scale
-        for values in (overlay.recorded[name], overlay.replica[name])
-    )
-    time_s = overlay.time_s[known]
-    kept = sorted({*_kept(recorded), *_kept(replica)})
-    wrong = np.flatnonzero(overlay.differs[name][known])
-    marked = wrong if len(wrong) <= MARKS else wrong[np.linspace(0, len(wrong) - 1, MARKS).astype(np.int64)]
-    return Overlaid(
-        label=f"{name} ({signal.unit})" if signal.unit else name,
-        digits=signal.digits,
-        time_s=_rounded(time_s[kept]),
-        recorded=_rounded(recorded[kept]),
-        replica=_rounded(replica[kept]),
-        differing_s=_rounded(time_s[marked]),
-        differing=_rounded(recorded[marked]),
-    )
-
-
-def _rounded(values: Samples) -> tuple[float, ...]:
-    return tuple(round(float(each), 6) for each in values)
-
-
-def _kept(values: Samples) -> list[int]:
-    return [int(place) for place in select_samples(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)]

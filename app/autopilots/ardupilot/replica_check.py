@@ -1,4 +1,5 @@
-"""ArduCopter's entry in the registry: its on-board log, and traces: described CSV, one row per step (`trace_table`)."""
+"""ArduCopter's loop beside its replica: its on-board log, and traces: described CSV, one row per step
+(`trace_table`)."""
 
 from collections.abc import Iterable, Mapping
 from functools import partial
@@ -9,7 +10,7 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history, read_ardupilot
+from app.autopilots.ardupilot.log import NOT_POSITION, TERMS, history
 from app.autopilots.ardupilot.replica.parameters import (
     DEFAULTS,
     LOOP_RATE,
@@ -20,20 +21,18 @@ from app.autopilots.ardupilot.replica.parameters import (
 )
 from app.autopilots.ardupilot.replica.replay import Hover, LoopLog, LoopTrace, replayed, replica_of
 from app.autopilots.ardupilot.replica.vertical import INPUTS, OUTPUTS
-from app.autopilots.loop_check import (
-    LoopCheck,
-    Result,
+from app.autopilots.recording import Column, Recording, refusal
+from app.autopilots.replica_check import (
+    LoopReplica,
+    Replay,
+    ReplicaCheck,
     Signal,
-    TraceReplay,
-    Upload,
+    check_replay,
     grouped,
     replay_of_log,
-    result_of_trace,
 )
-from app.autopilots.recording import Column, Recording, refusal
 from app.core.errors import InputError
 from app.core.records.trajectory import Samples
-from app.logs.formats import Format
 from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 
 _PRECISION: Final = "firmware and recording have single precision"
@@ -71,24 +70,24 @@ _TRACE_HINT: Final = (
 _IN_SI: Final = {"WPNAV_SPEED_UP_m_s", "WPNAV_SPEED_DN_m_s", "WPNAV_ACCEL_Z_m_s2"}
 
 
-def _examine_log(upload: Upload) -> Result:
-    log = ardupilot_loop_log(read_ardupilot(upload.stream), name=upload.name)
-    compared = replay_of_log(log, replica_of(log), log.time_s, gains=log.parameters.gains, notes=_notes)
-    return result_of_trace(_SIGNALS, compared, kind="log")
+def _check_log(recording: Recording, name: str, _given: str) -> ReplicaCheck:
+    log = ardupilot_loop_log(recording, name=name)
+    replay = replay_of_log(log, replica_of(log), log.time_s, gains=log.parameters.gains, notes=_notes)
+    return check_replay(_SIGNALS, replay, kind="log")
 
 
-def _examine_trace(upload: Upload) -> Result:
-    trace = read_ardupilot_trace(upload.stream, name=upload.name)
+def _check_trace(stream: BinaryIO, name: str) -> ReplicaCheck:
+    trace = read_ardupilot_trace(stream, name=name)
     followed = int(trace.followed.sum())
     limited = f"{grouped(followed)} rows at a throttle limit are each computed from the recorded row before."
-    replay = TraceReplay(
+    replay = Replay(
         time_s=trace.time_s,
         recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
         replica=dict(zip(OUTPUTS, replayed(trace).T, strict=True)),
         gains=trace.parameters.gains,
         notes=(limited, _UP) if followed else (_UP,),
     )
-    return result_of_trace(_SIGNALS, replay)
+    return check_replay(_SIGNALS, replay, kind="trace")
 
 
 def read_ardupilot_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
@@ -216,16 +215,11 @@ def _of_same_loop(column: Column | None, time_s: Samples) -> Samples:
     return np.where(np.abs(at_s[nearest] - time_s) <= _SAME_LOOP_S, column.values[nearest], np.nan)
 
 
-CHECK: Final = LoopCheck(
-    recordings="ArduCopter's .bin log of a flight in GUIDED, or a trace of its vertical loop with one row per step, "
-    ".csv or .csv.gz",
+REPLICA: Final = LoopReplica(
     signals=_SIGNALS,
-    figures=MappingProxyType(
-        {"reference": ("Shaped target", OUTPUTS[:3]), "commands": ("Controllers and throttle", OUTPUTS[3:])}
-    ),
+    figures=(("Shaped target", OUTPUTS[:3]), ("Controllers and throttle", OUTPUTS[3:])),
     note=_UP,
-    log=Format.DATAFLASH,
+    check_log=_check_log,
     is_trace=partial(has_columns, columns=COLUMNS),
-    examine_log=_examine_log,
-    examine_trace=_examine_trace,
+    check_trace=_check_trace,
 )

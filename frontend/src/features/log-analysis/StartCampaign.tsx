@@ -1,0 +1,47 @@
+import { Button } from "@mantine/core";
+import { useState } from "react";
+import { useNavigate } from "react-router";
+import { useStartCampaign } from "../../api/logAnalyses";
+import type { RecordFiles } from "../../api/records";
+import { useVehicles } from "../../api/vehicles";
+import { SelectField } from "../../ui/Fields";
+import { ErrorNotice } from "../../ui/Notices";
+
+/** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
+export function StartCampaign({ files, experiment }: { files: RecordFiles; experiment: string | null }) {
+  const { mutate, error, isPending } = useStartCampaign();
+  const navigate = useNavigate();
+  const [chosen, setChosen] = useState("");
+  const flying = (useVehicles().data ?? []).filter(
+    ({ registered, experiments }) => registered && experiments.includes(experiment ?? ""),
+  );
+  const isOpen = flying.length > 1 && chosen === "";
+  return (
+    <>
+      {flying.length > 1 && (
+        <SelectField
+          aria-label="Vehicle of the log"
+          data={[
+            { value: "", label: "Vehicle of the log…" },
+            ...flying.map(({ id, name }) => ({ value: String(id), label: name })),
+          ]}
+          value={chosen}
+          onChange={setChosen}
+        />
+      )}
+      <Button
+        loading={isPending}
+        disabled={isOpen}
+        onClick={() =>
+          mutate(
+            { files, vehicle: chosen === "" ? null : Number(chosen) },
+            { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
+          )
+        }
+      >
+        Start campaign
+      </Button>
+      <ErrorNotice error={error} />
+    </>
+  );
+}
