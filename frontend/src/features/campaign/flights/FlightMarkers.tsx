@@ -1,3 +1,4 @@
+import { Group } from "@mantine/core";
 import { IconAlertTriangle, IconCircleArrowDown, IconCircleArrowUp, IconCircleCheck } from "@tabler/icons-react";
 import type { Trial } from "../../../api/types";
 import { marksOf, predictionResult } from "../verdict/verdict";
@@ -13,22 +14,30 @@ export function FlightMarkers({ trial }: { trial: Trial }) {
   ));
 }
 
-const ICONS = { inside: IconCircleCheck, above: IconCircleArrowUp, below: IconCircleArrowDown } as const;
-const PREDICTION_LABELS = {
-  inside: "inside the predicted interval",
-  above: "above the predicted interval",
-  below: "below the predicted interval",
+const RESULTS = {
+  inside: { Icon: IconCircleCheck, label: "inside the predicted interval", color: "var(--best)" },
+  above: { Icon: IconCircleArrowUp, label: "above the predicted interval", color: "var(--warn)" },
+  below: { Icon: IconCircleArrowDown, label: "below the predicted interval", color: "var(--warn)" },
 } as const;
 
 /** Whether the error is inside its predicted interval. */
 export function PredictionResult({ trial, brief = false }: { trial: Trial; brief?: boolean }) {
-  const kept = predictionResult(trial);
-  if (kept === null) return null;
-  const Icon = ICONS[kept];
+  const result = predictionResult(trial);
+  if (result === null) return null;
+  const { Icon, label, color } = RESULTS[result];
   return (
-    <small className={classes["kept"]} data-kept={kept} title={brief ? PREDICTION_LABELS[kept] : undefined}>
-      <Icon size={15} {...(brief ? { "aria-label": PREDICTION_LABELS[kept] } : { "aria-hidden": true })} />
-      {!brief && PREDICTION_LABELS[kept]}
-    </small>
+    <Group
+      component="span"
+      display="inline-flex"
+      gap={3}
+      wrap="nowrap"
+      c={color}
+      fz="fine"
+      fw={550}
+      title={brief ? label : ""}
+    >
+      <Icon size={15} aria-label={label} aria-hidden={!brief} />
+      {!brief && label}
+    </Group>
   );
 }

@@ -6,6 +6,7 @@ import { confirmationIn, RECORD_FILES, recordOf, takeoffsIn } from "../../../api
 import type { NewTrial } from "../../../api/types";
 import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
+import page from "../CampaignPage.module.css";
 
 interface Props {
   upload: RecordUpload;
@@ -56,10 +57,13 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
       </FileButton>
       <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid"]} />
       {takeoffsIn(problem).map(({ number, summary }) => (
-        <Button key={number} variant="default" h="auto" py="xs" onClick={() => again({ takeoff: number })}>
-          <span style={{ whiteSpace: "normal" }}>
-            Takeoff {number}: {summary}
-          </span>
+        <Button
+          key={number}
+          variant="default"
+          className={page["wrapping"] ?? ""}
+          onClick={() => again({ takeoff: number })}
+        >
+          Takeoff {number}: {summary}
         </Button>
       ))}
       {accepting !== null && (

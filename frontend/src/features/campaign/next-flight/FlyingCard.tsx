@@ -7,11 +7,13 @@ import { isSaturated, outputNow, readingOf, throttleNow } from "../../../live/te
 import { isAfterRecord } from "../../../live/vehicleStatus";
 import { withUnit } from "../../../ui/format";
 import { GainList } from "../../../ui/gains";
+import { LabelledValue } from "../../../ui/LabelledValue";
 import { Note } from "../../../ui/Note";
 import { Panel } from "../../../ui/Panel";
-import { intervalText, percentOrNothing } from "../../../ui/uncertainty";
+import { percentOrNothing } from "../../../ui/uncertainty";
 import { useUnits } from "../../../ui/units";
 import { FlightMarkers } from "../flights/FlightMarkers";
+import { Predicted } from "./BeforeFlight";
 import classes from "./NextFlight.module.css";
 import { flyingStage, STAGED } from "./nextStep";
 
@@ -42,31 +44,25 @@ export function FlyingCard({ campaign, trial, step }: Props) {
       tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
     >
       <Stack gap={14}>
-        <dl className={`${classes["big"]} numbers`}>
-          <div className={classes["reading"]} data-wide data-stale={isStale || undefined}>
-            <dt>{isStale ? `${reading.title}, last known` : reading.title}</dt>
-            <dd>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</dd>
-          </div>
-          <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>{isUnscored ? "Error" : "Error so far"}</dt>
-            <dd>{isUnscored ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
-          </div>
-          <div className={classes["reading"]}>
-            <dt>Predicted error</dt>
-            <dd>
-              {withUnit(trial?.predicted_error, unit)}{" "}
-              {trial?.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
-            </dd>
-          </div>
-          <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>Time</dt>
-            <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
-          </div>
+        <dl className={`${classes["values"]} ${classes["live"]} numbers`}>
+          <LabelledValue
+            title={isStale ? `${reading.title}, last known` : reading.title}
+            value={withUnit(outputNow(live, status), reading.unit, reading.digits)}
+            stale={isStale}
+          />
+          <LabelledValue
+            title={isUnscored ? "Error" : "Error so far"}
+            value={isUnscored ? "not scored" : withUnit(live?.errorSoFar, unit)}
+            stale={isStale}
+          />
+          <LabelledValue title="Predicted error" value={<Predicted trial={trial} unit={unit} />} />
+          <LabelledValue title="Time" value={withUnit(live?.timeS.at(-1), "s", 1)} stale={isStale} />
           {live !== null && live.throttle !== null && (
-            <div className={classes["reading"]} data-stale={isStale || undefined}>
-              <dt>{isSaturated(live) && !isAfter ? "Throttle, saturated" : "Throttle"}</dt>
-              <dd>{percentOrNothing(throttleNow(live, status))}</dd>
-            </div>
+            <LabelledValue
+              title={isSaturated(live) && !isAfter ? "Throttle, saturated" : "Throttle"}
+              value={percentOrNothing(throttleNow(live, status))}
+              stale={isStale}
+            />
           )}
         </dl>
         {trial && (

@@ -60,7 +60,7 @@ function offered(proposal: Proposal): NextStep {
 }
 
 /** Shows the top of the page, where the flight is watched, once it has begun; a refusal is told where it was ordered. */
-export function watched(flight: Promise<unknown>): void {
+export function scrollUpOnceBegun(flight: Promise<unknown>): void {
   flight.then(
     () => window.scrollTo({ top: 0 }),
     () => undefined,

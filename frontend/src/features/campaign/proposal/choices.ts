@@ -1,8 +1,7 @@
 /** What may be flown next: the proposal, its variants, or custom gains. */
 
 import type { GainSet } from "../../../api/evaluation";
-import type { Problem } from "../../../api/problems";
-import type { FlightChoice, Gate, NewTrial, Proposal, RepeatGroup } from "../../../api/types";
+import type { FlightChoice, NewTrial, Proposal, RepeatGroup } from "../../../api/types";
 import { flightsText } from "../../../ui/format";
 
 type FlownGains = Pick<RepeatGroup, "trial_numbers">;
@@ -43,21 +42,4 @@ export function trialOf(proposal: Proposal, choice: FlightChoice | undefined, ga
   if (choice === undefined) return { gains };
   if (choice.proposed) return { proposal_id: proposal.id };
   return choice.kind === "step" ? { gains } : { variant: choice.kind, gains };
-}
-
-/** The gate's refusal in the form of a refused request. */
-export function refusalOf({ checks }: Gate): Problem {
-  return {
-    status: 422,
-    title: "The gate refuses these gains.",
-    detail: "",
-    hint: "",
-    problems: checks
-      .filter(({ passed }) => !passed)
-      .map(({ gain, sentence, offer = {} }) => ({
-        field: gain ? `gains.${gain}` : "gains",
-        reason: sentence,
-        ...(Object.keys(offer).length > 0 ? { offer } : {}),
-      })),
-  };
 }
