@@ -284,6 +284,9 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
             refused += [f"{state}: {found}" for found in violations_beside_an_answer(page)]
         close_it_again(dashboard)
         if name in WITH_TABS:
+            dashboard.open_tab("Statistics")
+            dashboard.settled(look.theme)
+            refused += overflow(dashboard, f"{state}, statistics,")
             dashboard.open_tab("Flights")
             page.mouse.move(0, 0)
             dashboard.settled(look.theme)

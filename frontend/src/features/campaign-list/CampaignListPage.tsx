@@ -12,7 +12,7 @@ import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
-import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
+import { STATE_FILTERS, STATES, type StateFilter } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
 import { ImportBundle } from "./ImportBundle";
 
@@ -35,7 +35,7 @@ export function CampaignListPage() {
   const [sought] = useDebouncedValue(search.trim(), 200);
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
   const filtered = sought !== "" || state !== "all" || vehicle !== "";
-  const campaigns = useCampaigns({ search: sought, state: statesFor(state), vehicle: vehicle ? [vehicle] : [], sort });
+  const campaigns = useCampaigns({ search: sought, state: STATES[state], vehicle: vehicle ? [vehicle] : [], sort });
   const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
   const total = campaigns.data?.pages[0]?.total ?? 0;
   if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;

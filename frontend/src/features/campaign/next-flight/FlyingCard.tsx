@@ -19,20 +19,22 @@ import { flyingStage, STAGED } from "./nextStep";
 
 interface Props {
   campaign: Campaign;
-  trial: Trial | undefined;
-  step: { trialId: number; trialNumber: number };
+  trials: readonly Trial[];
+  flight: NonNullable<Campaign["flying"]>;
 }
 
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */
-export function FlyingCard({ campaign, trial, step }: Props) {
+export function FlyingCard({ campaign, trials, flight }: Props) {
+  const { trial_id: trialId, trial_number: number } = flight;
+  const trial = trials.find(({ id }) => id === trialId);
   const abort = useOutletContext<AbortControl>();
   const { state, worker } = useConnection();
-  const live = useLiveFlight(step.trialId);
+  const live = useLiveFlight(trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
   const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
-  const aborting = abortStage(step.trialId, abort, status?.status.step);
+  const aborting = abortStage(trialId, abort, status?.status.step);
   const isUnscored = isCutShort(aborting, status?.status.step);
   const stage = flyingStage(trial, live);
   const isAfter = isAfterRecord(status?.status.step);
@@ -40,7 +42,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const isStale = !useIsOutputCurrent(live, status) && hasOutput;
   return (
     <Panel
-      title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
+      title={`Flight ${number}: ${stage.toLowerCase()}`}
       tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
     >
       <Stack gap={14}>
@@ -72,7 +74,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </Note>
         )}
         {registered && (
-          <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
+          <Button component={Link} to={`/fly/${trialId}`} size="lg">
             Open fly screen
           </Button>
         )}

@@ -44,7 +44,7 @@ function Step(props: Props & { isSecondary?: boolean }) {
   const upload = useUploadRecord(campaign.id);
   switch (step.kind) {
     case "flying":
-      return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
+      return <FlyingCard campaign={campaign} trials={trials} flight={step.flight} />;
     case "finished":
       return <FinishedCard campaign={campaign} onChoose={onChoose} isSecondary={isSecondary} />;
     case "rehearse":
@@ -52,7 +52,6 @@ function Step(props: Props & { isSecondary?: boolean }) {
     case "planned":
       return <PlannedCard campaign={campaign} trial={step.trial} upload={upload} />;
     case "propose":
-    case "nothing better":
       return (
         <ProposalCard
           key={step.proposal.id}

@@ -83,7 +83,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
             )}
           </>
         ) : (
-          <ImportRecord upload={upload} trialId={trial.id} />
+          <ImportRecord upload={upload} target={{ trialId: trial.id }} />
         )}
         <Button
           variant="default"

@@ -11,15 +11,9 @@ import page from "../CampaignPage.module.css";
 import { More } from "./More";
 import classes from "./Proposal.module.css";
 
-interface GateChecksProps {
-  gate: Gate | null;
-  /** Whether the result belongs to the gains shown. */
-  isCurrent?: boolean;
-}
-
-/** Gate checks of a flight: a summary line, and each check when opened or when one has failed. */
-export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
-  if (gate === null || !isCurrent) {
+/** Gate checks of a flight: a summary line, and each check when opened or when one has failed. Null while they run. */
+export function GateChecks({ gate }: { gate: Gate | null }) {
+  if (gate === null) {
     return (
       <Note className={classes["more"] ?? ""} mih={48} pt={12} role="status">
         Running the gate checks…

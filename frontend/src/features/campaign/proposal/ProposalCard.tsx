@@ -115,7 +115,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
               hasModel={hasModel}
             />
           )}
-          {isEvaluated && !refusal && <GateChecks gate={gate.result} isCurrent={gate.isCurrent} />}
+          {isEvaluated && !refusal && <GateChecks gate={gate.isCurrent ? gate.result : null} />}
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
         {campaign.actions.includes("delete") && <DeleteCampaign campaign={campaign} />}
@@ -155,7 +155,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   if (!can_fly) {
     return (
       <>
-        <ImportRecord upload={upload} {...(trial === undefined ? {} : { plan: trial })} />
+        <ImportRecord upload={upload} target={trial ? { plan: trial } : null} />
         <Button variant="default" loading={planning.isPending} disabled={trial === undefined} onClick={chosen.plan}>
           Plan flight {number}
         </Button>
