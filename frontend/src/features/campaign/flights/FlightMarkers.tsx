@@ -14,24 +14,21 @@ export function FlightMarkers({ trial }: { trial: Trial }) {
   ));
 }
 
-const RESULTS = {
-  inside: { Icon: IconCircleCheck, label: "inside the predicted interval", color: "var(--best)" },
-  above: { Icon: IconCircleArrowUp, label: "above the predicted interval", color: "var(--warn)" },
-  below: { Icon: IconCircleArrowDown, label: "below the predicted interval", color: "var(--warn)" },
-} as const;
+const ICONS = { inside: IconCircleCheck, above: IconCircleArrowUp, below: IconCircleArrowDown } as const;
 
 /** Whether the error is inside its predicted interval. */
 export function PredictionResult({ trial, brief = false }: { trial: Trial; brief?: boolean }) {
   const result = predictionResult(trial);
   if (result === null) return null;
-  const { Icon, label, color } = RESULTS[result];
+  const Icon = ICONS[result];
+  const label = `${result} the predicted interval`;
   return (
     <Group
       component="span"
       display="inline-flex"
       gap={3}
       wrap="nowrap"
-      c={color}
+      c={result === "inside" ? "var(--best)" : "var(--warn)"}
       fz="fine"
       fw={550}
       title={brief ? label : ""}

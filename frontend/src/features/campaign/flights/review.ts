@@ -59,22 +59,19 @@ export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "
 /** Class of a reviewed flight. */
 export type FlightClass = "valid" | "aborted" | "invalid";
 
+const OTHERS: Partial<Record<Trial["state"], FlightClass[]>> = {
+  valid: ["invalid"],
+  aborted: ["invalid"],
+  lost: ["invalid"],
+  invalid: ["valid"],
+  captured: ["valid", "aborted", "invalid"],
+};
+
 /** Classes that a flight can be changed to. */
 export function otherClasses(trial: Trial): FlightClass[] {
   if (!trial.actions.includes("classify")) return [];
-  switch (trial.state) {
-    case "valid":
-    case "aborted":
-    case "lost":
-      return ["invalid"];
-    case "invalid":
-      if (trial.flight?.state === "aborted") return ["aborted"];
-      return trial.may_be_valid ? ["valid"] : [];
-    case "captured":
-      return trial.may_be_valid ? ["valid", "aborted", "invalid"] : ["aborted", "invalid"];
-    default:
-      return [];
-  }
+  if (trial.state === "invalid" && trial.flight?.state === "aborted") return ["aborted"];
+  return (OTHERS[trial.state] ?? []).filter((one) => one !== "valid" || trial.may_be_valid);
 }
 
 interface Suggestion {
@@ -82,22 +79,18 @@ interface Suggestion {
   why: string;
 }
 
+const UNSCORED = { invalid: "the measurement is unusable", aborted: "the flight was aborted" };
+
 /** Suggested class and its reason; the operator decides. */
 export function suggestedClass(
   trial: Pick<Trial, "state" | "record" | "may_be_valid" | "glitches" | "reason">,
 ): Suggestion | null {
   if (trial.state === "lost") return { outcome: "invalid", why: trial.reason || "the end of the flight is unknown" };
   if (trial.state !== "captured" || trial.record === null) return null;
-  switch (trial.record.ending) {
-    case "invalid":
-      return { outcome: "invalid", why: trial.reason || "the measurement is unusable" };
-    case "aborted":
-      return { outcome: "aborted", why: trial.reason || "the flight was aborted" };
-    case "completed": {
-      if (!trial.may_be_valid) return { outcome: "invalid", why: "the record ends before the scored window does" };
-      const glitches = trial.glitches.length;
-      if (glitches === 0) return { outcome: "valid", why: "the record is complete and without glitches" };
-      return { outcome: "invalid", why: `the record has ${glitches} glitch${glitches === 1 ? "" : "es"}` };
-    }
-  }
+  const { ending } = trial.record;
+  if (ending !== "completed") return { outcome: ending, why: trial.reason || UNSCORED[ending] };
+  if (!trial.may_be_valid) return { outcome: "invalid", why: "the record ends before the scored window does" };
+  const glitches = trial.glitches.length;
+  if (glitches === 0) return { outcome: "valid", why: "the record is complete and without glitches" };
+  return { outcome: "invalid", why: `the record has ${glitches} glitch${glitches === 1 ? "" : "es"}` };
 }

@@ -1,6 +1,5 @@
 import { Group } from "@mantine/core";
 import { IconFlagCheck, IconHome, IconRepeat, IconStairsUp } from "@tabler/icons-react";
-import type { ReactNode } from "react";
 import type { Explanation, FittedParameter, Proposal } from "../../../api/types";
 import { Aside } from "../../../ui/Aside";
 import { against, gainText, NOTHING, percentChange, trueMinus, withUnit } from "../../../ui/format";
@@ -124,55 +123,41 @@ interface ProposalDetailsProps {
   hasModel: boolean;
 }
 
-/** Details of the proposed gains: the explanation, and the steps evaluated on the model. */
+/** Details of the proposed gains: why these, what the model says of others, and the steps evaluated on it. */
 export function ProposalDetails({ proposal, campaignId, said, unit, hasModel }: ProposalDetailsProps) {
   const { explanation, gains } = proposal;
-  return (
-    <>
-      <ProposalExplanation explanation={explanation} said={said}>
-        {hasModel && <Landscape campaignId={campaignId} />}
-      </ProposalExplanation>
-      <Tried explanation={explanation} unit={unit} gains={gains} />
-    </>
-  );
-}
-
-interface ExplanationProps {
-  explanation: Explanation;
-  said: string;
-  /** What the model says of other gains. */
-  children: ReactNode;
-}
-
-/** Summary, expected information, trust region, limits, fitted parameters. */
-function ProposalExplanation({ explanation, said, children }: ExplanationProps) {
   const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
   const summary = said.includes(explanation.summary) ? "" : explanation.summary;
   const isModelled = Object.keys(explanation.gradient ?? {}).length > 0 || fitted.length > 0;
-  if (!children && notes.length === 0 && `${lesson}${summary}` === "") return null;
+  const isExplained = hasModel || notes.length > 0 || lesson !== "" || summary !== "";
   return (
-    <More summary="Explanation">
-      {summary && <span>{summary}</span>}
-      {lesson && (
-        <span>
-          <strong>What this flight will show:</strong> {lesson}
-        </span>
+    <>
+      {isExplained && (
+        <More summary="Explanation">
+          {summary && <span>{summary}</span>}
+          {lesson && (
+            <span>
+              <strong>What this flight will show:</strong> {lesson}
+            </span>
+          )}
+          {trust !== null && (
+            <span className="numbers">
+              Trust region: {percent(trust)} of each gain's range
+              <HelpTip topic="trustRegion" />
+            </span>
+          )}
+          {clipped.length > 0 && <span>Limited by: {clipped.join(", ")}.</span>}
+          {notes.map((note, index) => (
+            <span key={note}>
+              {note} {index === 0 && isModelled && <HelpTip topic="bias" />}
+            </span>
+          ))}
+          {fitted.length > 0 && <Fitted parameters={fitted} />}
+          {hasModel && <Landscape campaignId={campaignId} />}
+        </More>
       )}
-      {trust !== null && (
-        <span className="numbers">
-          Trust region: {percent(trust)} of each gain's range
-          <HelpTip topic="trustRegion" />
-        </span>
-      )}
-      {clipped.length > 0 && <span>Limited by: {clipped.join(", ")}.</span>}
-      {notes.map((note, index) => (
-        <span key={note}>
-          {note} {index === 0 && isModelled && <HelpTip topic="bias" />}
-        </span>
-      ))}
-      {fitted.length > 0 && <Fitted parameters={fitted} />}
-      {children}
-    </More>
+      <Tried explanation={explanation} unit={unit} gains={gains} />
+    </>
   );
 }
 

@@ -4,8 +4,6 @@ import type { GainSet } from "../../../api/evaluation";
 import type { FlightChoice, NewTrial, Proposal, RepeatGroup } from "../../../api/types";
 import { flightsText } from "../../../ui/format";
 
-type FlownGains = Pick<RepeatGroup, "trial_numbers">;
-
 export type ChoiceName = FlightChoice["kind"] | "own";
 
 export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
@@ -32,7 +30,7 @@ export function isDoubtful({ kind, choices }: Pick<Proposal, "kind" | "choices">
 }
 
 /** The flights of these gains, whose mean is the prediction of a repeat. */
-export function repeatSource(name: ChoiceName, group: FlownGains | undefined): string {
+export function repeatSource(name: ChoiceName, group: Pick<RepeatGroup, "trial_numbers"> | undefined): string {
   if (!isRepeat(name) || group === undefined) return "";
   return `${group.trial_numbers.length > 1 ? "mean" : "error"} of ${flightsText(group.trial_numbers)} with these gains`;
 }
