@@ -168,22 +168,24 @@ function withOwnUnit(text: string, unit: string): string {
 /** Fitted parameters of the vehicle, next to their values before the flights. */
 function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   return (
-    <dl className="numbers">
+    <div className="numbers">
       <Note fz="fine">
         Fitted parameters (± standard error) <HelpTip topic="fitted" />
       </Note>
-      {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
-        <div key={name}>
-          <dt>{withOwnUnit(title, unit)}</dt>
-          <Group component="dd" gap="0 12px" justify="space-between" fz="fine">
-            <span>
-              fitted <strong>{plusMinus(value, standard_error, "")}</strong>
-            </span>
-            <span>prior {plusMinus(nominal, prior_sd, "")}</span>
-          </Group>
-        </div>
-      ))}
-    </dl>
+      <dl>
+        {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
+          <div key={name}>
+            <dt>{withOwnUnit(title, unit)}</dt>
+            <Group component="dd" gap="0 12px" justify="space-between" fz="fine">
+              <span>
+                fitted <strong>{plusMinus(value, standard_error, "")}</strong>
+              </span>
+              <span>prior {plusMinus(nominal, prior_sd, "")}</span>
+            </Group>
+          </div>
+        ))}
+      </dl>
+    </div>
   );
 }
 
