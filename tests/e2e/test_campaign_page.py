@@ -139,3 +139,10 @@ def test_a_flight_of_a_finished_campaign_is_shown_beside_its_result_once_it_is_s
     expect(dashboard.panel("Flight 3")).to_be_visible()
     dashboard.page.keyboard.press("k")
     expect(dashboard.panel("Flight 2")).to_be_visible()
+
+
+def test_an_address_of_a_tab_that_is_no_longer_there_shows_the_first_tab(
+    dashboard: Dashboard, campaigns: Campaigns
+) -> None:
+    dashboard.open(f"/campaigns/{campaigns.finished}?tab=landscape")
+    expect(dashboard.page.get_by_role("tab", name="Error and gains")).to_have_attribute("aria-selected", "true")

@@ -64,9 +64,8 @@ class Pages:
         fixed = FIXED.get(name)
         return fixed if fixed is not None else str(getattr(self, name.replace("-", "_")))
 
-    def _campaign(self, campaign_id: int, *, landscape: bool = True) -> str:
-        if landscape:
-            self._states.survey(campaign_id)
+    def _campaign(self, campaign_id: int) -> str:
+        self._states.survey(campaign_id)
         return f"/campaigns/{campaign_id}"
 
     @cached_property
@@ -97,7 +96,7 @@ class Pages:
 
     @cached_property
     def finished(self) -> str:
-        return self._campaign(self.flights_finished[0])
+        return f"/campaigns/{self.flights_finished[0]}"
 
     @cached_property
     def elsewhere(self) -> str:
@@ -276,15 +275,18 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
             refused += [f"{state}: {found}" for found in violations_beside_an_answer(page)]
         close_it_again(dashboard)
         if name in WITH_TABS:
+            dashboard.open_tab("Statistics")
+            dashboard.settled(look.theme)
+            refused += overflow(dashboard, f"{state}, statistics,")
             dashboard.open_tab("Flights")
             page.mouse.move(0, 0)
             dashboard.settled(look.theme)
             refused += [*overflow(dashboard, f"{state}, flights,"), *(violations(page) if look.rules else [])]
             dashboard.open_tab("Error and gains")
             page.mouse.move(0, 0)
-    if name in WITH_TABS:
-        dashboard.open_tab("Error landscape")
-        dashboard.panel("Error landscape").scroll_into_view_if_needed()  # it is drawn once it is in view
+    if name in WITH_TABS and name != "finished":
+        for details in ("Explanation", "Error landscape"):
+            page.get_by_text(details, exact=True).click()
         expect(dashboard.plot("Error landscape")).to_be_visible()
     assert refused == []
 

@@ -37,8 +37,9 @@ def test_the_next_flight_is_drawn_with_its_band_and_interval_and_the_fitted_para
     card.get_by_text("Explanation").click()
     assert len(why["fitted"]) >= 4
     for one in why["fitted"]:
-        row = card.get_by_role("table", name="Fitted parameters").get_by_role("rowgroup").filter(has_text=one["title"])
-        expect(row).to_contain_text(printed(one["value"], one["standard_error"], "").strip())
+        term = dashboard.page.get_by_role("term").filter(has_text=one["title"])
+        value = printed(one["value"], one["standard_error"], "").strip()
+        expect(card.locator("dl > div").filter(has=term)).to_contain_text(value)
     expect(card).to_contain_text(why["lesson"])
     card.get_by_role("button", name="What is the interval?").click()
     expect(dashboard.page.get_by_text("Nine out of ten flights should fall inside it")).to_be_visible()

@@ -3,13 +3,10 @@ import {
   ApiError,
   formProblem,
   inPercent,
-  limitsOf,
-  offersOf,
   otherProblems,
   problemFrom,
   problemOf,
   reasonsByField,
-  reasonsOf,
   retries,
   standingProblem,
 } from "./problems";
@@ -59,23 +56,6 @@ test("a reading is tried again while the server is away, and never after a refus
   expect(retries(0, new ApiError(refused))).toBe(false);
 });
 
-test("values that would pass are read from the refusals that have any", () => {
-  const problem = problemFrom(422, {
-    title: "The gate refuses these gains.",
-    problems: [
-      { field: "gains.ki", reason: "can wrap", offer: { ki: 1073 } },
-      { field: "gains", reason: "too far", offer: {} },
-      { field: "gains.kd", reason: "can wrap", offer: { kd: 409, odd: "x" } },
-    ],
-  });
-  expect(offersOf(problem)).toEqual([
-    ["ki", 1073],
-    ["kd", 409],
-  ]);
-  expect(offersOf(null)).toEqual([]);
-  expect(limitsOf(problem)).toEqual(["can wrap"]);
-});
-
 test("reasons stay in their order, and sentences are joined by a space", () => {
   const problem = problemFrom(422, {
     problems: [
@@ -84,8 +64,6 @@ test("reasons stay in their order, and sentences are joined by a space", () => {
       { field: "gains", reason: "The product can wrap." },
     ],
   });
-  expect(reasonsOf(problem)).toHaveLength(3);
-  expect(reasonsOf(problem)[0]).toBe("The step is too large.");
   expect(reasonsByField(problem, ["ki"])["ki"]).toBe("The step is too large. The vehicle can be stuck on the ground.");
 });
 

@@ -3,8 +3,6 @@
 export interface FieldProblem {
   field: string;
   reason: string;
-  /** Gain values that would pass, if the server knows them. */
-  offer?: Record<string, number>;
 }
 
 export interface Problem {
@@ -59,27 +57,9 @@ function fieldProblems(value: unknown): FieldProblem[] {
   if (!Array.isArray(value)) return [];
   return value.flatMap((entry: unknown) => {
     if (typeof entry !== "object" || entry === null) return [];
-    const { field, reason, offer } = entry as Record<string, unknown>;
-    if (typeof field !== "string" || typeof reason !== "string") return [];
-    const offered = offeredBy(offer);
-    return [{ field, reason, ...(Object.keys(offered).length > 0 ? { offer: offered } : {}) }];
+    const { field, reason } = entry as Record<string, unknown>;
+    return typeof field === "string" && typeof reason === "string" ? [{ field, reason }] : [];
   });
-}
-
-function offeredBy(value: unknown): Record<string, number> {
-  if (typeof value !== "object" || value === null) return {};
-  return Object.fromEntries(Object.entries(value).filter(([, number]) => typeof number === "number"));
-}
-
-/** Gain values that would pass, of all refusals together. */
-export function offersOf(problem: Problem | null): [gain: string, value: number][] {
-  const all = Object.assign({}, ...(problem?.problems ?? []).map(({ offer }) => offer ?? {})) as Record<string, number>;
-  return Object.entries(all);
-}
-
-/** Reasons of the limits that offer other values; every offer is within all of them. */
-export function limitsOf(problem: Problem | null): string[] {
-  return [...new Set((problem?.problems ?? []).filter(({ offer }) => offer !== undefined).map(({ reason }) => reason))];
 }
 
 /** The page's words where the API's title is the term of its protocol, by the type of the error or its status. */
@@ -154,11 +134,6 @@ export function inPercent(reason: string | undefined): string | undefined {
 /** Join sentences by a space, and other texts by a semicolon. */
 function joined(one: string, other: string): string {
   return /[.!?]$/.test(one) ? `${one} ${other}` : `${one}; ${other}`;
-}
-
-/** Reasons of a gain refusal, the most important first, as the server lists them. */
-export function reasonsOf(problem: Problem | null): string[] {
-  return [...new Set((problem?.problems ?? []).map(({ reason }) => reason))];
 }
 
 /** Refused fields that are not among `fields`. */

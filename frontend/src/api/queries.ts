@@ -161,10 +161,10 @@ export function useFlightFigure(trialId: number, theme: Theme) {
 export const recordCsv = (trialId: number): string => `/api/trials/${trialId}/trajectory.csv`;
 
 /** The request starts the computation, so it is sent only when the panel is in view. */
-export function useLandscape(campaignId: number, theme: Theme, stacked: boolean, enabled: boolean) {
+export function useLandscape(campaignId: number, theme: Theme, enabled: boolean) {
   return useQuery({
-    queryKey: ["campaign", campaignId, "landscape", theme, String(stacked)],
-    queryFn: () => answer(getLandscape({ path: { campaign_id: campaignId }, query: { theme, stacked } })),
+    queryKey: ["campaign", campaignId, "landscape", theme],
+    queryFn: () => answer(getLandscape({ path: { campaign_id: campaignId }, query: { theme } })),
     placeholderData: keepPreviousData,
     enabled,
   });

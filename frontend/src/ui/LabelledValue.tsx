@@ -1,9 +1,10 @@
+import type { ReactNode } from "react";
 import type { Topic } from "./explanations";
 import { HelpTip } from "./HelpTip";
 
 interface Props {
-  title: string;
-  value: string;
+  title: ReactNode;
+  value: ReactNode;
   topic?: Topic;
   bad?: boolean;
   stale?: boolean;

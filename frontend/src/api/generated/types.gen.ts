@@ -7816,12 +7816,6 @@ export type GetLandscapeData = {
          * colours for a light or a dark page
          */
         theme?: 'light' | 'dark';
-        /**
-         * Stacked
-         *
-         * one column of slices, for a narrow page
-         */
-        stacked?: boolean;
     };
     url: '/api/campaigns/{campaign_id}/figures/landscape';
 };

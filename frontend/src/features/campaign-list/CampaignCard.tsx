@@ -1,10 +1,13 @@
-import { Stack } from "@mantine/core";
+import { Group, Stack, Text } from "@mantine/core";
 import { useState } from "react";
 import { Link } from "react-router";
 import type { CampaignSummary } from "../../api/types";
 import { Sparkline } from "../../charts/Sparkline";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
+import { LabelledValue } from "../../ui/LabelledValue";
+import { Note } from "../../ui/Note";
+import panel from "../../ui/Panel.module.css";
 import { campaignStateLabel } from "../../ui/states";
 import { plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
@@ -19,31 +22,37 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
   const hasPassed = campaign.has_passed_as_rehearsal;
   const units = useUnits(campaign.experiment);
   return (
-    <li className={classes["card"]}>
-      <div className={classes["top"]}>
+    <Stack component="li" gap={10} className={`${panel["panel"]} ${classes["card"]}`}>
+      <Group justify="space-between" gap={10} wrap="nowrap">
         <VehicleBadge isReal={vehicle.is_real} />
         <StateBadge words={campaignStateLabel({ ...campaign, hasPassed })} />
-      </div>
-      <h2 className={classes["name"]}>
+      </Group>
+      <Text component="h2" fz="strong" fw={650} lh={1.3}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
-      </h2>
-      <p className={classes["vehicle"]}>{vehicle.registered ? vehicle.name : vehicle.title}</p>
+      </Text>
+      <Note fz="small" mt={-6}>
+        {vehicle.registered ? vehicle.name : vehicle.title}
+      </Note>
       <Sparkline curves={spark} setPoint={units.setPoint} />
-      <dl className={`${classes["figures"]} numbers`}>
-        <div>
-          <dt>{(best?.standard_error ?? null) === null ? "Best error" : "Best error ± standard error"}</dt>
-          <dd>{plusMinus(best?.mean, best?.standard_error, units.error)}</dd>
-        </div>
-        <div>
-          <dt>{count(flights, "flight")}</dt>
-          <dd className={classes["progress"]} data-better={campaign.verdict === "better" || undefined}>
-            {progress(campaign) ?? " "}
-          </dd>
-        </div>
-      </dl>
-      <p className={classes["next"]}>{next_action}</p>
+      <Stack component="dl" gap={4} className="numbers">
+        <LabelledValue
+          title={(best?.standard_error ?? null) === null ? "Best error" : "Best error ± standard error"}
+          value={plusMinus(best?.mean, best?.standard_error, units.error)}
+        />
+        <LabelledValue
+          title={count(flights, "flight")}
+          value={
+            <Text span inherit fw={550} c={campaign.verdict === "better" ? "var(--best)" : "dimmed"}>
+              {progress(campaign) ?? " "}
+            </Text>
+          }
+        />
+      </Stack>
+      <Note fz="small" mt="auto" pt={10} className={classes["next"] ?? ""}>
+        {next_action}
+      </Note>
       <More campaign={campaign} />
-    </li>
+    </Stack>
   );
 }
 

@@ -1,4 +1,4 @@
-import { Box, Button, Group, SegmentedControl, Skeleton, TextInput, Title } from "@mantine/core";
+import { Box, Button, Group, SegmentedControl, SimpleGrid, Skeleton, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -12,7 +12,7 @@ import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
-import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
+import { STATE_FILTERS, STATES, type StateFilter } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
 import { ImportBundle } from "./ImportBundle";
 
@@ -24,6 +24,8 @@ const SORTS: { value: Sort; label: string }[] = [
   { value: "error", label: "Lowest error" },
 ];
 
+const CARDS = { minColWidth: "min(300px, 100%)", spacing: "var(--gap)" };
+
 export function CampaignListPage() {
   useTitle("Campaigns");
   const [search, setSearch] = useState("");
@@ -33,7 +35,7 @@ export function CampaignListPage() {
   const [sought] = useDebouncedValue(search.trim(), 200);
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
   const filtered = sought !== "" || state !== "all" || vehicle !== "";
-  const campaigns = useCampaigns({ search: sought, state: statesFor(state), vehicle: vehicle ? [vehicle] : [], sort });
+  const campaigns = useCampaigns({ search: sought, state: STATES[state], vehicle: vehicle ? [vehicle] : [], sort });
   const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
   const total = campaigns.data?.pages[0]?.total ?? 0;
   if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
@@ -48,8 +50,9 @@ export function CampaignListPage() {
         </Button>
         <ImportBundle />
       </Group>
-      <search className={classes["filters"]}>
+      <Group component="search" gap={10} mb={18} className={classes["filters"] ?? ""}>
         <TextInput
+          flex="1 1 160px"
           aria-label="Search campaigns by name"
           placeholder="Search"
           leftSection={<IconSearch size={18} aria-hidden />}
@@ -59,12 +62,13 @@ export function CampaignListPage() {
         <SegmentedControl
           aria-label="State"
           size="md"
-          className={classes["states"]}
           value={state}
           onChange={(value) => setState(value as StateFilter)}
           data={STATE_FILTERS}
         />
         <SelectField
+          flex="9 1 150px"
+          maw={200}
           aria-label="Vehicle"
           data={[
             { value: "", label: "All vehicles" },
@@ -73,15 +77,15 @@ export function CampaignListPage() {
           value={vehicle}
           onChange={setVehicle}
         />
-        <SelectField aria-label="Sort by" data={SORTS} value={sort} onChange={setSort} />
-      </search>
+        <SelectField flex="9 1 150px" maw={200} aria-label="Sort by" data={SORTS} value={sort} onChange={setSort} />
+      </Group>
       <ErrorNotice error={campaigns.error} />
       {campaigns.isPending && (
-        <div className={classes["cards"]} aria-busy="true">
+        <SimpleGrid {...CARDS} aria-busy="true">
           {[1, 2, 3].map((one) => (
             <Skeleton key={one} height={250} radius="md" />
           ))}
-        </div>
+        </SimpleGrid>
       )}
       {campaigns.data && found.length === 0 && (
         <div className={work["none"]}>
@@ -100,11 +104,11 @@ export function CampaignListPage() {
           )}
         </div>
       )}
-      <ul className={classes["cards"]} aria-label="Campaigns">
+      <SimpleGrid component="ul" {...CARDS} aria-label="Campaigns">
         {found.map((campaign) => (
           <CampaignCard key={campaign.id} campaign={campaign} />
         ))}
-      </ul>
+      </SimpleGrid>
       {campaigns.hasNextPage && (
         <Box mt={20} ta="center">
           <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>

@@ -1,12 +1,13 @@
-import { Anchor, Button, Title } from "@mantine/core";
+import { Anchor, Box, Button, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link, useNavigate } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
+import panel from "../../ui/Panel.module.css";
+import page from "../campaign/CampaignPage.module.css";
 import { firstPreset } from "../new-campaign/newCampaign";
-import classes from "./FirstCampaign.module.css";
 import { ImportBundle } from "./ImportBundle";
 
 const STEPS = [
@@ -25,7 +26,7 @@ export function FirstCampaign() {
   const create = useCreateCampaign();
   const preset = catalogue.data && firstPreset(catalogue.data);
   return (
-    <section className={classes["first"]}>
+    <Stack component="section" align="center" gap={14} maw={820} mx="auto" mt="3vh" ta="center">
       <Drawing />
       <Title order={1} lh={1.15}>
         Tune a takeoff in a few flights
@@ -34,17 +35,23 @@ export function FirstCampaign() {
         A campaign flies one vehicle repeatedly, each time with new gains, and stops when no further improvement is
         found.
       </Note>
-      <ol className={classes["steps"]}>
-        {STEPS.map(([title, text]) => (
-          <li key={title}>
-            <strong>{title}</strong>
-            <span>{text}</span>
+      <SimpleGrid component="ol" minColWidth={210} autoFlow="auto-fit" spacing={14} w="100%" mt={8} mb={10} ta="left">
+        {STEPS.map(([title, text], index) => (
+          <li key={title} className={panel["panel"]}>
+            <Text fz="body" fw={650}>
+              <Text span inherit c="var(--best)">
+                {index + 1}.
+              </Text>{" "}
+              {title}
+            </Text>
+            <Note fz="body">{text}</Note>
           </li>
         ))}
-      </ol>
+      </SimpleGrid>
       <Button
         size="lg"
-        classNames={{ root: classes["create"] ?? "", label: classes["createLabel"] ?? "" }}
+        maw="100%"
+        className={page["wrapping"] ?? ""}
         loading={create.isPending}
         disabled={preset === undefined}
         leftSection={<IconPlus size={22} aria-hidden />}
@@ -59,18 +66,22 @@ export function FirstCampaign() {
       </Anchor>
       <ImportBundle />
       <ErrorNotice error={catalogue.error ?? create.error} />
-    </section>
+    </Stack>
   );
 }
 
 /** Three takeoffs, each closer to the dotted set point. */
 function Drawing() {
   return (
-    <svg viewBox="0 0 420 130" className={classes["drawing"]} aria-hidden>
-      <line x1="10" x2="410" y1="48" y2="48" className={classes["target"]} />
-      <path d="M10 120C46 120 56 12 96 12s64 46 122 34 60-34 102-22 52 20 90 22" className={classes["old"]} />
-      <path d="M10 120C42 120 52 28 86 28s50 30 94 24 70-8 230-4" className={classes["middle"]} />
-      <path d="M10 120C40 120 46 44 78 44s36 6 78 4 120 0 254 0" className={classes["best"]} />
-    </svg>
+    <Box component="svg" w="min(420px, 90%)" viewBox="0 0 420 130" fill="none" strokeLinecap="round" aria-hidden>
+      <path d="M10 48H410" stroke="var(--edge)" strokeWidth={1.5} strokeDasharray="2 6" />
+      <path
+        d="M10 120C46 120 56 12 96 12s64 46 122 34 60-34 102-22 52 20 90 22"
+        stroke="var(--earlier)"
+        strokeWidth={1.5}
+      />
+      <path d="M10 120C42 120 52 28 86 28s50 30 94 24 70-8 230-4" stroke="var(--earlier)" strokeWidth={2} />
+      <path d="M10 120C40 120 46 44 78 44s36 6 78 4 120 0 254 0" stroke="var(--best)" strokeWidth={4} />
+    </Box>
   );
 }

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { CampaignSummary } from "../../api/types";
-import { progress, statesFor } from "./campaignList";
+import { progress, STATES } from "./campaignList";
 
 const summary = (
   best: number | null,
@@ -36,6 +36,6 @@ test("one flight is no progress yet", () => {
 });
 
 test("archived campaigns are shown only when asked for", () => {
-  expect(statesFor("all")).not.toContain("archived");
-  expect(statesFor("archived")).toEqual(["archived"]);
+  expect(STATES.all).not.toContain("archived");
+  expect(STATES.archived).toEqual(["archived"]);
 });

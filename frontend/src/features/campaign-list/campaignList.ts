@@ -12,16 +12,12 @@ export const STATE_FILTERS: { value: StateFilter; label: string }[] = [
   { value: "archived", label: "Archived" },
 ];
 
-const STATES: Record<StateFilter, CampaignState[]> = {
+export const STATES: Record<StateFilter, CampaignState[]> = {
   all: ["draft", "ready", "flying", "deciding", "finished"],
   open: ["draft", "ready", "flying", "deciding"],
   finished: ["finished"],
   archived: ["archived"],
 };
-
-export function statesFor(filter: StateFilter): CampaignState[] {
-  return STATES[filter];
-}
 
 /** Comparison of the best gains with the first; null before the second flight. */
 export function progress({ best, first_error, flights, verdict }: CampaignSummary): string | null {

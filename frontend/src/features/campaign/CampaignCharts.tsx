@@ -1,10 +1,10 @@
 /** The charts of a campaign. Each keeps its own state, so that the page is not rendered again for it. */
 
 import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
-import { useDebouncedValue, useIdle, useMediaQuery } from "@mantine/hooks";
-import { memo, useCallback, useDeferredValue, useEffect, useMemo, useRef, useState } from "react";
-import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../../api/queries";
-import type { Campaign, FigureCard, Trial } from "../../api/types";
+import { useDebouncedValue } from "@mantine/hooks";
+import { memo, useCallback, useDeferredValue, useMemo, useState } from "react";
+import { type TimeRange, useCampaignFigure, useCurveOf } from "../../api/queries";
+import type { Campaign, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { type NextFlight, withNextError, withNextGains } from "../../charts/nextFlight";
 import { openingTitle, type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
@@ -19,16 +19,6 @@ const EACH_DRAWN = 30;
 
 /** The server's figure opens at the first 8 s. */
 type Span = "first" | "whole";
-
-function useDressed(chosen: number | null, span: Span): (figure: PlotlyFigure) => PlotlyFigure {
-  return useCallback(
-    (figure) => ({
-      data: withChosen(figure.data, chosen),
-      layout: withTimeRange(figure.layout, span === "whole" ? wholeFlight(figure) : null),
-    }),
-    [chosen, span],
-  );
-}
 
 interface CurvesProps {
   campaign: Campaign;
@@ -60,6 +50,13 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
     setZoom(null);
   }, []);
   const showAll = useCallback(() => pick("whole"), [pick]);
+  const dressed = useCallback(
+    (raw: PlotlyFigure) => ({
+      data: withChosen(raw.data, chosen),
+      layout: withTimeRange(raw.layout, span === "whole" ? wholeFlight(raw) : null),
+    }),
+    [chosen, span],
+  );
   return (
     <FigurePanel
       title={takeoffs.data?.title ?? "Curves"}
@@ -67,7 +64,7 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
       error={takeoffs.error}
       height={440}
       topic="curves"
-      dressed={useDressed(chosen, span)}
+      dressed={dressed}
       prediction={preview?.prediction ?? null}
       className={`${classes["curves"]} ${preview?.isCurrent === false ? classes["outdated"] : ""}`}
       liveTrial={campaign.flying?.trial_id ?? null}
@@ -145,49 +142,3 @@ export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, preview
     </>
   );
 });
-
-const BESIDE_PX = 420;
-const STACKED_PX = 330;
-const WAITING_PX = 160;
-const IDLE_MS = 1500;
-
-function heightOf(card: FigureCard | undefined, stacked: boolean): number {
-  if (card?.state !== "ready") return WAITING_PX;
-  const axes = Object.keys((card.figure?.["layout"] ?? {}) as object).filter((name) => name.startsWith("xaxis"));
-  return stacked ? STACKED_PX * axes.length + 60 : BESIDE_PX;
-}
-
-/**
- * The gains as a path over the model's error. Drawing it is slow, so it is drawn when it is in view or the user is idle.
- */
-export function LandscapePanel({ campaignId }: { campaignId: number }) {
-  const place = useRef<HTMLDivElement>(null);
-  const [inView, setInView] = useState(false);
-  const [seen, setSeen] = useState(false);
-  const [shown, setShown] = useState<FigureCard | undefined>(undefined);
-  const idle = useIdle(IDLE_MS);
-  const theme = useComputedColorScheme("light");
-  const stacked = useMediaQuery("(max-width: 820px)", false, { getInitialValueInEffect: false });
-  const landscape = useLandscape(campaignId, theme, stacked, seen);
-  useEffect(() => {
-    const target = place.current;
-    if (target === null) return;
-    const observer = new IntersectionObserver((entries) => setInView(entries.at(-1)?.isIntersecting ?? false));
-    observer.observe(target);
-    return () => observer.disconnect();
-  }, []);
-  if (inView && !seen) setSeen(true);
-  if ((inView || (seen && idle)) && shown !== landscape.data) setShown(landscape.data);
-  return (
-    <div ref={place} className={classes["place"]}>
-      <FigurePanel
-        title="Error landscape predicted by the model"
-        card={shown}
-        error={landscape.error}
-        wanted={seen}
-        height={heightOf(shown, stacked)}
-        build="contours"
-      />
-    </div>
-  );
-}

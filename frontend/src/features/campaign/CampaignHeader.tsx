@@ -1,6 +1,6 @@
-import { ActionIcon, Anchor, Button, Group, Text, TextInput, Title } from "@mantine/core";
+import { ActionIcon, Anchor, Box, Button, Group, SimpleGrid, Text, TextInput, Title } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
-import { useCallback, useState } from "react";
+import { useState } from "react";
 import { Link } from "react-router";
 import { pathOf, useDownload } from "../../api/files";
 import { useRename } from "../../api/mutations";
@@ -10,7 +10,9 @@ import type { Campaign } from "../../api/types";
 import { useVehicle } from "../../api/vehicles";
 import { StateBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
+import { LabelledValue } from "../../ui/LabelledValue";
 import { ErrorNotice } from "../../ui/Notices";
+import panel from "../../ui/Panel.module.css";
 import { campaignStateLabel } from "../../ui/states";
 import { replacementOf } from "../../ui/units";
 import classes from "./CampaignPage.module.css";
@@ -23,12 +25,12 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const vehicle = useVehicle(campaign.vehicle.id) ?? campaign.vehicle;
   const replacement = catalogue && replacementOf(catalogue, campaign.definition.experiment ?? "takeoff");
   return (
-    <header className={classes["header"]}>
-      <Group gap="0 16px" align="center" className={renaming ? undefined : (classes["heading"] ?? "")}>
+    <Box component="header" mb={14}>
+      <Group gap="0 16px" className={renaming ? "" : (classes["heading"] ?? "")}>
         {renaming ? (
           <Rename campaign={campaign} onClose={() => setRenaming(false)} />
         ) : (
-          <Group gap={4} wrap="nowrap" className={classes["named"] ?? ""}>
+          <Group gap={4} wrap="nowrap" miw={0}>
             <Title order={1} lh={1.2} className={classes["name"] ?? ""} title={campaign.name}>
               {campaign.name}
             </Title>
@@ -39,7 +41,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         )}
         <Exports campaign={campaign} />
       </Group>
-      <div className={classes["facts"]}>
+      <Group gap="0 18px" c="dimmed" fz="small">
         <StateBadge
           words={campaignStateLabel({
             ...campaign,
@@ -50,37 +52,44 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         <span>{count(campaign.trials.flown, "flight")}</span>
         <details className={classes["settings"]}>
           <summary>Settings</summary>
-          <dl>
+          <SimpleGrid
+            component="dl"
+            minColWidth={200}
+            spacing={20}
+            verticalSpacing={10}
+            className={panel["panel"] ?? ""}
+          >
             {settingsOf(campaign, catalogue).map(([title, value]) => (
-              <div key={title}>
-                <dt>{title}</dt>
-                <dd>{value}</dd>
-              </div>
+              <LabelledValue key={title} title={title} value={value} />
             ))}
-          </dl>
+          </SimpleGrid>
         </details>
         <Anchor component={Link} to="/" py={4} fz="small" ms="auto">
           All campaigns
         </Anchor>
-      </div>
+      </Group>
       {replacement !== undefined && (
         <Text c="dimmed" fz="small">
           New campaigns fly “{replacement}” instead, because the gains hardly change the error of a takeoff with this
           autopilot.
         </Text>
       )}
-    </header>
+    </Box>
   );
 }
+
+const selected = (input: HTMLInputElement | null) => input?.select();
 
 function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void }) {
   const [name, setName] = useState(campaign.name);
   const rename = useRename(campaign);
   const problem = problemOf(rename.error);
-  const focused = useCallback((input: HTMLInputElement | null) => input?.select(), []);
   return (
-    <form
-      className={classes["rename"]}
+    <Group
+      component="form"
+      gap={8}
+      wrap="nowrap"
+      align="start"
       onKeyDown={(event) => event.key === "Escape" && onClose()}
       onSubmit={(event) => {
         event.preventDefault();
@@ -89,19 +98,20 @@ function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void
     >
       <TextInput
         aria-label="Campaign name"
+        w={480}
         value={name}
         maxLength={120}
-        ref={focused}
+        ref={selected}
         error={problem && [problem.detail || problem.title, problem.hint].join(" ")}
         onChange={(event) => setName(event.currentTarget.value)}
       />
-      <Button type="submit" loading={rename.isPending} disabled={name.trim() === ""}>
+      <Button type="submit" flex="none" loading={rename.isPending} disabled={name.trim() === ""}>
         Rename
       </Button>
-      <Button variant="default" onClick={onClose}>
+      <Button variant="default" flex="none" onClick={onClose}>
         Cancel
       </Button>
-    </form>
+    </Group>
   );
 }
 
@@ -110,8 +120,8 @@ function Exports({ campaign }: { campaign: Campaign }) {
   const pdf = useDownload(pathOf(campaign.id, "report.pdf"));
   const bundle = useDownload(pathOf(campaign.id, "bundle"));
   return (
-    <>
-      <Group gap={8} ms="auto">
+    <Box flex="none" maw="100%" ms="auto">
+      <Group gap={8}>
         <Button
           component="a"
           variant="default"
@@ -131,6 +141,6 @@ function Exports({ campaign }: { campaign: Campaign }) {
         )}
       </Group>
       <ErrorNotice error={pdf.error ?? bundle.error} />
-    </>
+    </Box>
   );
 }

@@ -1,4 +1,4 @@
-import { SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
+import { Group, SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
 import { flushSync } from "react-dom";
 import { useParams } from "react-router";
@@ -11,7 +11,7 @@ import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { ByFlightPanels, CurvesPanel, LandscapePanel } from "./CampaignCharts";
+import { ByFlightPanels, CurvesPanel } from "./CampaignCharts";
 import { CampaignHeader } from "./CampaignHeader";
 import classes from "./CampaignPage.module.css";
 import { FlightsPanel } from "./flights/FlightsPanel";
@@ -31,20 +31,20 @@ export function CampaignPage() {
 }
 
 function CampaignById({ campaignId }: { campaignId: number }) {
-  const campaign = useCampaign(campaignId);
-  const trials = useTrials(campaignId);
-  useTitle(campaign.data?.name ?? "Campaign");
-  if (campaign.data) {
-    return <CampaignView campaign={campaign.data} trials={trials.data ?? null} trouble={trials.error} />;
-  }
-  if (campaign.error) return <NotFound error={campaign.error} />;
-  return <Coming campaignId={campaignId} />;
+  const { data: campaign, error } = useCampaign(campaignId);
+  useTitle(campaign?.name ?? "Campaign");
+  if (campaign) return <CampaignView campaign={campaign} />;
+  return error ? <NotFound error={error} /> : <Coming campaignId={campaignId} />;
 }
+
+/** The two columns of the page. */
+const SIDE_BY_SIDE = { className: classes["columns"] ?? "", align: "stretch", gap: "var(--gap)" };
 
 /** Loading state. Requests all data of the page in parallel. */
 function Coming({ campaignId }: { campaignId: number }) {
   const theme = useComputedColorScheme("light");
   useCatalogue();
+  useTrials(campaignId);
   useProposal(campaignId);
   useCampaignFigure(campaignId, "takeoffs", theme);
   useCampaignFigure(campaignId, "errors", theme);
@@ -53,9 +53,11 @@ function Coming({ campaignId }: { campaignId: number }) {
     loadPlotly().catch(() => undefined); // the chart loads it again and reports the error
   }, []);
   return (
-    <div aria-busy="true" className={classes["columns"]}>
-      <Skeleton height={480} radius="md" />
-      <Skeleton height={480} radius="md" />
+    <div className={classes["page"]}>
+      <Group aria-busy="true" {...SIDE_BY_SIDE}>
+        <Skeleton height={480} radius="md" className={classes["results"] ?? ""} />
+        <Skeleton height={480} radius="md" className={classes["action"] ?? ""} />
+      </Group>
     </div>
   );
 }
@@ -64,24 +66,17 @@ const NONE: readonly Trial[] = [];
 const Verdict = memo(VerdictPanel);
 const Next = memo(NextFlightCard);
 const Statistics = memo(StatisticsPanel);
-const Landscape = memo(LandscapePanel);
 
-interface View {
-  campaign: Campaign;
-  /** Null while loading; the charts do not wait for them. */
-  trials: readonly Trial[] | null;
-  trouble: unknown;
-}
-
-function CampaignView({ campaign, trials: read, trouble }: View) {
+function CampaignView({ campaign }: { campaign: Campaign }) {
+  // Undefined while loading; the charts do not wait for them.
+  const { data: read, error: trouble } = useTrials(campaign.id);
   const trials = read ?? NONE;
   const [chosen, setChosen] = useState<number | null>(null);
   const [preview, setPreview] = useState<Preview | null>(null);
   const [tab, openTab] = useTab();
   const standing = useCampaignStatus(campaign.id);
-  const unproposed = useProposal(campaign.id).error;
-  const experiment = campaign.definition.experiment ?? "takeoff";
-  const unit = useUnits(experiment).error;
+  const problem = useProposal(campaign.id).error ?? trouble;
+  const unit = useUnits(campaign.definition.experiment ?? "takeoff").error;
   const shown = shownTrial(trials, chosen, standing?.campaign ?? campaign);
   const watching = useReadOnlyReason(campaign.vehicle);
   const choose = useCallback(
@@ -109,35 +104,24 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
     flownBefore.current = flown;
   }, [flown]);
   return (
-    <>
+    <div className={classes["page"]}>
       <p className="visually-hidden" role="status">
         {campaign.flying ? `Flight ${campaign.flying.trial_number} is in progress.` : (trials.at(-1)?.verdict ?? "")}
       </p>
       <CampaignHeader campaign={campaign} />
       <ReadOnlyNotice why={watching} />
-      <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
-        <div className={classes["column"]} ref={results}>
+      {/* On narrow screens the action comes first, but a flight under way is watched. */}
+      <Group wrap={campaign.flying === null ? "wrap-reverse" : "wrap"} {...SIDE_BY_SIDE}>
+        <div className={classes["results"]} ref={results}>
           <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} preview={preview} onChoose={choose} />
-          {shown !== null && (
-            <Verdict
-              trial={shown}
-              trials={trials}
-              isBest={shown.id === campaign.best?.trial_id}
-              unit={unit}
-              experiment={experiment}
-            />
-          )}
+          {shown !== null && <Verdict trial={shown} trials={trials} />}
         </div>
-        <div className={`${classes["column"]} ${classes["next"]}`}>
+        <div className={classes["action"]}>
           {standing !== null && <Next {...standing} onChoose={show} onPreview={setPreview} onReview={review} />}
-          {standing === null &&
-            (unproposed || trouble ? (
-              <ErrorNotice error={unproposed ?? trouble} />
-            ) : (
-              <Skeleton height={480} radius="md" />
-            ))}
+          {standing === null && !problem && <Skeleton height={480} radius="md" />}
+          {standing === null && <ErrorNotice error={problem} />}
         </div>
-      </div>
+      </Group>
       <Tabs
         value={tab}
         onChange={openTab}
@@ -151,7 +135,6 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
             Flights{selection.selected.length > 0 && ` (${selection.selected.length} selected)`}
           </Tabs.Tab>
           <Tabs.Tab value="statistics">Statistics</Tabs.Tab>
-          <Tabs.Tab value="landscape">Error landscape</Tabs.Tab>
         </Tabs.List>
         <Tabs.Panel value="trends" pt="var(--gap)">
           <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)">
@@ -161,7 +144,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
         <Tabs.Panel value="flights" keepMounted>
           <FlightsPanel
             campaign={campaign}
-            trials={read}
+            trials={read ?? null}
             shown={shown?.number ?? null}
             unit={unit}
             onChoose={choose}
@@ -169,12 +152,9 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
           />
         </Tabs.Panel>
         <Tabs.Panel value="statistics" pt="var(--gap)">
-          {read !== null && <Statistics campaignId={campaign.id} />}
-        </Tabs.Panel>
-        <Tabs.Panel value="landscape">
-          <Landscape campaignId={campaign.id} />
+          {read && <Statistics campaignId={campaign.id} />}
         </Tabs.Panel>
       </Tabs>
-    </>
+    </div>
   );
 }

@@ -103,18 +103,9 @@ test("a draft is not frozen yet", () => {
   );
 });
 
-test("settings of the vehicle that are at their defaults are left out", () => {
-  const options = [
-    { name: "gust", title: "Gusts", unit: "m/s", default: 0 },
-    { name: "mass", title: "Mass", unit: "kg", default: 0.4 },
-  ];
-  const campaign = {
-    definition: { stop: {}, start: { kind: "default" } },
-    vehicle: { kind: "jsbsim", title: "Simulated", options: { gust: 0, mass: 0.5, other: 1 } },
-  } as unknown as Campaign;
-  const catalogue = { experiments: [], strategies: [], vehicle_kinds: [{ name: "jsbsim", options }] };
-  const names = settingsOf(campaign, catalogue as unknown as Catalogue).map(([name]) => name);
-  expect(names).toContain("Mass");
-  expect(names).toContain("other");
-  expect(names).not.toContain("Gusts");
+test("settings of the vehicle that are at their defaults are left out, unknown ones are not", () => {
+  const kind = { name: "jsbsim", options: [{ ...WIND, default: 90 }] };
+  const names = settingsOf(campaign, { ...catalogue, vehicle_kinds: [kind] } as Catalogue).map(([name]) => name);
+  expect(names).toContain("mass_kg");
+  expect(names).not.toContain("Wind from");
 });

@@ -40,13 +40,8 @@ function optionRows(options: Record<string, unknown>, known: readonly Described[
 
 /** Options that differ from the vehicle's defaults, and those that are not known. */
 function changedOptions(options: Record<string, unknown>, known: readonly OptionInfo[] = []): Record<string, unknown> {
-  const isDefault = (name: string, value: unknown) =>
-    known.some((option) => option.name === name && option.default === value);
-  return Object.fromEntries(Object.entries(options).filter(([name, value]) => !isDefault(name, value)));
-}
-
-function named(things: readonly Described[] | undefined, name: string): string {
-  return things?.find((thing) => thing.name === name)?.title ?? name;
+  const defaults = new Map<string, unknown>(known.map((option) => [option.name, option.default]));
+  return Object.fromEntries(Object.entries(options).filter(([name, value]) => defaults.get(name) !== value));
 }
 
 function stopText(stop: Definition["stop"], openUntilFlight: number): string {
@@ -91,34 +86,31 @@ export function windowOf(definition: Definition, catalogue?: Catalogue): number 
 }
 
 export function settingsOf(campaign: Campaign, catalogue?: Catalogue): Row[] {
-  const { definition, vehicle, definition_digest, open_until_flight } = campaign;
+  const { definition, vehicle, definition_digest: digest, open_until_flight } = campaign;
   const { stop, start } = definition;
   const kind = catalogue?.vehicle_kinds.find(({ name }) => name === vehicle.kind);
   const strategy = catalogue?.strategies.find(({ name }) => name === definition.strategy);
   const experiment = experimentOf(definition, catalogue);
   const unitOf = (name: string): string => experiment?.gains?.find((gain) => gain.name === name)?.unit ?? "";
-  const rows: Row[] = [
+  const bounds = Object.entries(definition.bounds ?? {});
+  const rows: (Row | false)[] = [
     ["Vehicle", vehicle.title],
     ...optionRows(changedOptions(vehicle.options, kind?.options), kind?.options),
-    ["Experiment", named(catalogue?.experiments, definition.experiment)],
+    ["Experiment", experiment?.title ?? definition.experiment ?? ""],
     ...optionRows(experimentOptions(definition, catalogue), experiment?.options),
-    ["Strategy", named(catalogue?.strategies, definition.strategy)],
+    ["Strategy", strategy?.title ?? definition.strategy],
     ...optionRows(definition.options ?? {}, strategy?.options),
     ["Start", startText(start)],
     ["Stop rule", stopText(stop, open_until_flight)],
-    ...(stop?.min_battery_v ? ([["Minimum battery voltage", `${stop.min_battery_v} V after a flight`]] as Row[]) : []),
-    ...Object.entries(definition.bounds ?? {}).map(
-      ([name, [low, high]]): Row => [`Bounds of ${name}`, valueText(`${low} … ${high}`, unitOf(name))],
-    ),
+    Boolean(stop?.min_battery_v) && ["Minimum battery voltage", `${stop?.min_battery_v} V after a flight`],
+    ...bounds.map(([name, [low, high]]): Row => [`Bounds of ${name}`, valueText(`${low} … ${high}`, unitOf(name))]),
     [
       "Maximum step",
       `${percent(definition.first_step_fraction ?? 0)} of each gain's range until the first valid flight, then ${percent(definition.step_fraction ?? 0)}`,
     ],
-    ...(definition.ceiling_m && experiment?.output_unit === "m"
-      ? ([["Gate ceiling", `${definition.ceiling_m} m`]] as Row[])
-      : []),
-    ...(vehicle.can_fly && !vehicle.registered ? ([["Seed", String(definition.seed)]] as Row[]) : []),
+    Boolean(definition.ceiling_m) && experiment?.output_unit === "m" && ["Gate ceiling", `${definition.ceiling_m} m`],
+    vehicle.can_fly && !vehicle.registered && ["Seed", String(definition.seed)],
+    Boolean(digest) && ["Definition digest", `${digest}`.slice(0, 12)],
   ];
-  if (definition_digest) rows.push(["Definition digest", definition_digest.slice(0, 12)]);
-  return rows;
+  return rows.filter((row) => row !== false);
 }

@@ -20,8 +20,7 @@ import { FlightNotes } from "../campaign/flights/FlightNotes";
 import { AbortCause, FlightReview } from "../campaign/flights/FlightReview";
 import { FlightProblem } from "../campaign/next-flight/BeforeFlight";
 import { wantsRehearsal } from "../campaign/next-flight/nextStep";
-import { SpeedSwitch } from "../campaign/next-flight/SpeedSwitch";
-import { speedOf, useSpeed } from "../campaign/next-flight/speed";
+import { SpeedSwitch, useSpeed } from "../campaign/next-flight/speed";
 import { sentenceOf } from "../campaign/verdict/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
@@ -103,7 +102,7 @@ function SafeGainsResult({ trial, vehicle }: { trial: Trial; vehicle: Vehicle })
 
 /** Actions of the current step for a simulation without a link: one click flies. */
 export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
-  const [speed, setSpeed] = useSpeed();
+  const speed = useSpeed();
   const fly = useFlyTrial(campaign);
   switch (step) {
     case "plan":
@@ -116,11 +115,11 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
                 leftSection={<IconPlaneDeparture size={24} aria-hidden />}
                 loading={fly.isPending}
                 disabled={!trial.actions.includes("fly") || isBlocked}
-                onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
+                onClick={() => fly.mutate({ trialId: trial.id, speed })}
               >
                 Fly flight {trial.number}
               </Button>
-              <SpeedSwitch value={speed} onChange={setSpeed} />
+              <SpeedSwitch />
             </>
           ) : (
             <p className={classes["say"]}>

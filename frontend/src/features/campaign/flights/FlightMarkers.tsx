@@ -1,3 +1,4 @@
+import { Group } from "@mantine/core";
 import { IconAlertTriangle, IconCircleArrowDown, IconCircleArrowUp, IconCircleCheck } from "@tabler/icons-react";
 import type { Trial } from "../../../api/types";
 import { marksOf, predictionResult } from "../verdict/verdict";
@@ -14,21 +15,26 @@ export function FlightMarkers({ trial }: { trial: Trial }) {
 }
 
 const ICONS = { inside: IconCircleCheck, above: IconCircleArrowUp, below: IconCircleArrowDown } as const;
-const PREDICTION_LABELS = {
-  inside: "inside the predicted interval",
-  above: "above the predicted interval",
-  below: "below the predicted interval",
-} as const;
 
 /** Whether the error is inside its predicted interval. */
 export function PredictionResult({ trial, brief = false }: { trial: Trial; brief?: boolean }) {
-  const kept = predictionResult(trial);
-  if (kept === null) return null;
-  const Icon = ICONS[kept];
+  const result = predictionResult(trial);
+  if (result === null) return null;
+  const Icon = ICONS[result];
+  const label = `${result} the predicted interval`;
   return (
-    <small className={classes["kept"]} data-kept={kept} title={brief ? PREDICTION_LABELS[kept] : undefined}>
-      <Icon size={15} {...(brief ? { "aria-label": PREDICTION_LABELS[kept] } : { "aria-hidden": true })} />
-      {!brief && PREDICTION_LABELS[kept]}
-    </small>
+    <Group
+      component="span"
+      display="inline-flex"
+      gap={3}
+      wrap="nowrap"
+      c={result === "inside" ? "var(--best)" : "var(--warn)"}
+      fz="fine"
+      fw={550}
+      title={brief ? label : ""}
+    >
+      <Icon size={15} aria-label={label} aria-hidden={!brief} />
+      {!brief && label}
+    </Group>
   );
 }

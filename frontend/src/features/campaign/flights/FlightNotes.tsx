@@ -1,4 +1,4 @@
-import { Button, FileButton, Group, InputBase } from "@mantine/core";
+import { ActionIcon, Box, Button, FileButton, Group, InputBase, Stack } from "@mantine/core";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../../api/records";
@@ -18,7 +18,7 @@ export interface NotePin {
 interface Props {
   trial: Trial;
   /** A new pin adds its line to the note. */
-  pin?: NotePin | null;
+  pin?: NotePin | null | undefined;
 }
 
 /** Note and photos of a flight; a tablet takes photos with its camera. */
@@ -30,53 +30,64 @@ export function FlightNotes({ trial, pin = null }: Props) {
   const [hasDraft] = useState(() => draftOf(trial.id, trial.note) !== trial.note);
   const kept = hasDraft || trial.note !== "" || photos.length > 0 || pin !== null;
   return (
-    <details className={classes["notes"]} open={kept || undefined}>
+    <details open={kept || undefined}>
       <summary>Note and photos</summary>
-      {/* The key keeps unsaved text when a review changes the trial's version. */}
-      <Note key={`${trial.id} ${trial.note}`} trial={trial} pin={pin} />
-      {photos.length > 0 && (
-        <ul className={classes["photos"]}>
-          {photos.map(({ id }, index) => (
-            <li key={id}>
-              <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
-                <img src={photoAddress(trial.id, id)} alt={`Flight ${trial.number}, ${index + 1}`} loading="lazy" />
-              </a>
-              <button
-                type="button"
-                aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
-                aria-expanded={id === asked}
-                onClick={() => setAsked(id === asked ? null : id)}
-              >
-                <IconTrash size={18} aria-hidden />
-              </button>
-            </li>
-          ))}
-        </ul>
-      )}
-      {asked !== null && doomed >= 0 && (
-        <Group gap={8}>
-          <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
-          <Button variant="default" onClick={() => setAsked(null)}>
-            Cancel
-          </Button>
-          <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
-            Delete photo {doomed + 1}
-          </Button>
-        </Group>
-      )}
-      <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
-        {(props) => (
-          <Button
-            {...props}
-            variant="default"
-            loading={add.isPending}
-            leftSection={<IconCamera size={20} aria-hidden />}
-          >
-            Add photo
-          </Button>
+      <Stack gap={12} align="start">
+        {/* The key keeps unsaved text when a review changes the trial's version. */}
+        <Note key={`${trial.id} ${trial.note}`} trial={trial} pin={pin} />
+        {photos.length > 0 && (
+          <Group component="ul" gap={10}>
+            {photos.map(({ id }, index) => (
+              <Box component="li" key={id} pos="relative">
+                <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
+                  <img
+                    className={classes["photo"]}
+                    src={photoAddress(trial.id, id)}
+                    alt={`Flight ${trial.number}, ${index + 1}`}
+                    loading="lazy"
+                  />
+                </a>
+                <ActionIcon
+                  variant="default"
+                  pos="absolute"
+                  right={0}
+                  bottom={0}
+                  c={id === asked ? "error" : ""}
+                  aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
+                  aria-expanded={id === asked}
+                  onClick={() => setAsked(id === asked ? null : id)}
+                >
+                  <IconTrash size={18} aria-hidden />
+                </ActionIcon>
+              </Box>
+            ))}
+          </Group>
         )}
-      </FileButton>
-      <ErrorNotice error={add.error ?? remove.error ?? error} />
+        {asked !== null && doomed >= 0 && (
+          <Group gap={8}>
+            <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
+            <Button variant="default" onClick={() => setAsked(null)}>
+              Cancel
+            </Button>
+            <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
+              Delete photo {doomed + 1}
+            </Button>
+          </Group>
+        )}
+        <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
+          {(props) => (
+            <Button
+              {...props}
+              variant="default"
+              loading={add.isPending}
+              leftSection={<IconCamera size={20} aria-hidden />}
+            >
+              Add photo
+            </Button>
+          )}
+        </FileButton>
+        <ErrorNotice error={add.error ?? remove.error ?? error} />
+      </Stack>
     </details>
   );
 }
@@ -95,8 +106,11 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
   const save = useNote(trial, (sent) => forgetDraft(trial.id, sent));
   const isTooLong = note.length > LONGEST_NOTE;
   return (
-    <form
-      className={classes["note"]}
+    <Stack
+      component="form"
+      gap={8}
+      align="start"
+      w="100%"
       onSubmit={(event) => {
         event.preventDefault();
         save.mutate(note);
@@ -105,6 +119,8 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
       <InputBase
         component="textarea"
         ref={text}
+        w="100%"
+        classNames={{ input: classes["text"] ?? "" }}
         description="A line that starts with a time, such as “2.4 s: wobble”, is marked on the record chart."
         multiline
         label={`Note on flight ${trial.number}`}
@@ -124,7 +140,7 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
         </Button>
       )}
       <ErrorNotice error={save.error} />
-    </form>
+    </Stack>
   );
 }
 

@@ -7,12 +7,11 @@ import type { FigureCard } from "../../../api/types";
 import { FigurePanel } from "../../../charts/FigurePanel";
 import { grouped } from "../../../ui/format";
 import { NotFound, NotFoundPage } from "../../../ui/NotFound";
-import { useUnits } from "../../../ui/units";
 import { useTitle } from "../../../ui/useTitle";
+import page from "../CampaignPage.module.css";
 import { GateChecks } from "../proposal/Gate";
 import { VerdictPanel } from "../verdict/VerdictPanel";
 import type { NotePin } from "./FlightNotes";
-import classes from "./FlightPage.module.css";
 import { useFlightKeys } from "./useFlightKeys";
 
 export function FlightPage() {
@@ -40,8 +39,6 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const trial = useTrial(trialId);
   const trials = useTrials(campaignId).data ?? [];
   const figure = useFlightFigure(trialId, theme);
-  const experiment = campaign?.definition.experiment ?? "takeoff";
-  const unit = useUnits(experiment).error;
   const hasSeed = campaign?.vehicle.can_fly && !campaign.vehicle.registered;
   const [pinning, setPinning] = useState(false);
   const [pin, setPin] = useState<NotePin | null>(null);
@@ -64,12 +61,13 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
       <Title order={1} mb={12}>
         Flight {number}
       </Title>
-      <div className={classes["record"]}>
+      <div className={page["results"]}>
         <FigurePanel
           title="Record"
           card={figure.data}
           error={figure.error}
           height={recordHeight(figure.data)}
+          className={page["tall"]}
           onPlace={pinning ? place : undefined}
           tools={
             record !== null && (
@@ -84,28 +82,18 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
             )
           }
         />
+        <VerdictPanel trial={trial.data} trials={trials} pin={pin} />
+        <Box px={18} py={4} c="dimmed" fz="small">
+          {record !== null && (
+            <p className="numbers">
+              {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
+              {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>
+              {hasSeed && `, seed ${trial.data.seed}`}.
+            </p>
+          )}
+          <GateChecks gate={gate} />
+        </Box>
       </div>
-      <Box mt="var(--gap)">
-        <VerdictPanel
-          trial={trial.data}
-          trials={trials}
-          isBest={trialId === campaign?.best?.trial_id}
-          unit={unit}
-          experiment={experiment}
-          own
-          pin={pin}
-        />
-      </Box>
-      <Box mt="var(--gap)" px={18} py={4} c="dimmed" fz="small">
-        {record !== null && (
-          <p className="numbers">
-            {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
-            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>
-            {hasSeed && `, seed ${trial.data.seed}`}.
-          </p>
-        )}
-        <GateChecks gate={gate} />
-      </Box>
     </>
   );
 }

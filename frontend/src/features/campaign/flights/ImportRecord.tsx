@@ -6,22 +6,18 @@ import { confirmationIn, RECORD_FILES, recordOf, takeoffsIn } from "../../../api
 import type { NewTrial } from "../../../api/types";
 import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
+import page from "../CampaignPage.module.css";
 
 interface Props {
   upload: RecordUpload;
-  trialId?: number;
-  /** Planned with the record, without a `trialId`; the record can be uploaded once one of them is there. */
-  plan?: NewTrial;
+  /** The planned trial of the record, or the trial to plan with it; null until there is one. */
+  target: { trialId: number } | { plan: NewTrial } | null;
 }
 
 const ACCEPT = { confirm: "Import with the gains in the log", invalid: "Store as an invalid flight" };
 
 /** Upload of the record of a flight made elsewhere with these gains. */
-export function ImportRecord({ upload, trialId, plan }: Props) {
-  const target = {
-    ...(trialId === undefined ? {} : { trialId }),
-    ...(plan === undefined ? {} : { plan }),
-  };
+export function ImportRecord({ upload, target }: Props) {
   const problem = problemOf(upload.error);
   const accepting = confirmationIn(problem);
   const again = (answer: Partial<RecordOrder>) =>
@@ -47,7 +43,7 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
             fullWidth
             size="lg"
             loading={upload.isPending}
-            disabled={trialId === undefined && plan === undefined}
+            disabled={target === null}
             leftSection={<IconFileUpload size={22} aria-hidden />}
           >
             Upload flight record
@@ -56,10 +52,13 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
       </FileButton>
       <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid"]} />
       {takeoffsIn(problem).map(({ number, summary }) => (
-        <Button key={number} variant="default" h="auto" py="xs" onClick={() => again({ takeoff: number })}>
-          <span style={{ whiteSpace: "normal" }}>
-            Takeoff {number}: {summary}
-          </span>
+        <Button
+          key={number}
+          variant="default"
+          className={page["wrapping"] ?? ""}
+          onClick={() => again({ takeoff: number })}
+        >
+          Takeoff {number}: {summary}
         </Button>
       ))}
       {accepting !== null && (

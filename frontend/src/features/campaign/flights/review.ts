@@ -5,32 +5,23 @@ import { flightsText } from "../../../ui/format";
 import { sameHeld } from "../../../ui/gains";
 import { bestOfCounted } from "../verdict/verdict";
 
-type AbortWord = "behaved badly" | "something else";
+const ABORT_SENTENCES: Record<NonNullable<Trial["abort_cause"]>, string> = {
+  limit: "A limit was exceeded: the flight counts against its gains.",
+  operator: "Why was the flight aborted? It counts against its gains only if the cause was the vehicle's behaviour.",
+  "behaved badly": "Aborted because of the vehicle's behaviour: the flight counts against its gains.",
+  "something else": "Aborted for another cause: the flight does not count against its gains.",
+};
 
 /** Whether an aborted flight counts against its gains; empty for other flights. */
 export function abortSentence({ state, abort_cause: cause }: Pick<Trial, "state" | "abort_cause">): string {
   if (state !== "aborted") return "";
-  switch (cause) {
-    case "limit":
-      return "A limit was exceeded: the flight counts against its gains.";
-    case "operator":
-      return "Why was the flight aborted? It counts against its gains only if the cause was the vehicle's behaviour.";
-    case "behaved badly":
-      return "Aborted because of the vehicle's behaviour: the flight counts against its gains.";
-    case "something else":
-      return "Aborted for another cause: the flight does not count against its gains.";
-    default:
-      return "Abort cause not recorded: the flight counts against its gains.";
-  }
+  return cause === null ? "Abort cause not recorded: the flight counts against its gains." : ABORT_SENTENCES[cause];
 }
 
 /** Causes that the operator can select: those other than the current one. */
-export function abortWords({
-  actions,
-  abort_cause: cause,
-}: Pick<Trial, "actions" | "abort_cause">): readonly AbortWord[] {
-  if (!actions.includes("judge abort")) return [];
-  return (["behaved badly", "something else"] as const).filter((word) => word !== cause);
+export function abortWords({ actions, abort_cause: cause }: Pick<Trial, "actions" | "abort_cause">) {
+  const words = ["behaved badly", "something else"] as const;
+  return words.filter((word) => actions.includes("judge abort") && word !== cause);
 }
 
 /** Consequence of a class: which flight becomes the best, and which flights the next gains use. */
@@ -65,29 +56,30 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];
 
+/** Class of a reviewed flight. */
+export type FlightClass = "valid" | "aborted" | "invalid";
+
+const OTHERS: Partial<Record<Trial["state"], FlightClass[]>> = {
+  valid: ["invalid"],
+  aborted: ["invalid"],
+  lost: ["invalid"],
+  invalid: ["valid"],
+  captured: ["valid", "aborted", "invalid"],
+};
+
 /** Classes that a flight can be changed to. */
-export function otherClasses(trial: Trial): ("valid" | "aborted" | "invalid")[] {
+export function otherClasses(trial: Trial): FlightClass[] {
   if (!trial.actions.includes("classify")) return [];
-  switch (trial.state) {
-    case "valid":
-    case "aborted":
-      return ["invalid"];
-    case "invalid":
-      if (trial.flight?.state === "aborted") return ["aborted"];
-      return trial.may_be_valid ? ["valid"] : [];
-    case "captured":
-      return trial.may_be_valid ? ["valid", "aborted", "invalid"] : ["aborted", "invalid"];
-    case "lost":
-      return ["invalid"];
-    default:
-      return [];
-  }
+  if (trial.state === "invalid" && trial.flight?.state === "aborted") return ["aborted"];
+  return (OTHERS[trial.state] ?? []).filter((one) => one !== "valid" || trial.may_be_valid);
 }
 
-export interface Suggestion {
-  outcome: "valid" | "aborted" | "invalid";
+interface Suggestion {
+  outcome: FlightClass;
   why: string;
 }
+
+const UNSCORED = { invalid: "the measurement is unusable", aborted: "the flight was aborted" };
 
 /** Suggested class and its reason; the operator decides. */
 export function suggestedClass(
@@ -95,16 +87,10 @@ export function suggestedClass(
 ): Suggestion | null {
   if (trial.state === "lost") return { outcome: "invalid", why: trial.reason || "the end of the flight is unknown" };
   if (trial.state !== "captured" || trial.record === null) return null;
-  switch (trial.record.ending) {
-    case "invalid":
-      return { outcome: "invalid", why: trial.reason || "the measurement is unusable" };
-    case "aborted":
-      return { outcome: "aborted", why: trial.reason || "the flight was aborted" };
-    case "completed": {
-      if (!trial.may_be_valid) return { outcome: "invalid", why: "the record ends before the scored window does" };
-      const glitches = trial.glitches.length;
-      if (glitches === 0) return { outcome: "valid", why: "the record is complete and without glitches" };
-      return { outcome: "invalid", why: `the record has ${glitches} glitch${glitches === 1 ? "" : "es"}` };
-    }
-  }
+  const { ending } = trial.record;
+  if (ending !== "completed") return { outcome: ending, why: trial.reason || UNSCORED[ending] };
+  if (!trial.may_be_valid) return { outcome: "invalid", why: "the record ends before the scored window does" };
+  const glitches = trial.glitches.length;
+  if (glitches === 0) return { outcome: "valid", why: "the record is complete and without glitches" };
+  return { outcome: "invalid", why: `the record has ${glitches} glitch${glitches === 1 ? "" : "es"}` };
 }

@@ -1,13 +1,14 @@
-/** What a card says before a flight: its scored window, and why it cannot fly now or did not fly last time. */
+/** What cards say of a flight: its scored window, its prediction, and why it cannot fly now or did not fly last time. */
 
 import { Anchor } from "@mantine/core";
 import { Link } from "react-router";
 import { useCatalogue } from "../../../api/queries";
 import type { Definition, Trial } from "../../../api/types";
 import { useVehicle } from "../../../api/vehicles";
-import { asSentence } from "../../../ui/format";
+import { asSentence, withUnit } from "../../../ui/format";
 import { Note } from "../../../ui/Note";
 import { FailureNotice } from "../../../ui/Notices";
+import { intervalText } from "../../../ui/uncertainty";
 import { groundedReason } from "../../fleet/fleet";
 import { windowOf } from "../campaignSettings";
 import { isWithdrawnByOperator } from "./nextStep";
@@ -19,6 +20,16 @@ export function FlightWindow({ definition }: { definition: Definition }) {
     <Note fz="small" className="numbers">
       Scored window: {seconds} s from the takeoff command
     </Note>
+  );
+}
+
+/** The predicted error with its interval. */
+export function Predicted({ trial, unit }: { trial: Trial | undefined; unit: string }) {
+  return (
+    <>
+      {withUnit(trial?.predicted_error, unit)}{" "}
+      {trial?.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
+    </>
   );
 }
 

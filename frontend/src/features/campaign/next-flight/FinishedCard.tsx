@@ -1,4 +1,4 @@
-import { Button, Stack } from "@mantine/core";
+import { Button, Stack, Text } from "@mantine/core";
 import { IconRepeat } from "@tabler/icons-react";
 import { useGateRefusal } from "../../../api/evaluation";
 import { useReopen } from "../../../api/mutations";
@@ -18,14 +18,13 @@ import { ArchiveCampaign } from "../EndCampaign";
 import { PromoteGains } from "../verdict/PromoteGains";
 import { VERDICTS } from "../verdict/verdict";
 import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
-import classes from "./NextFlight.module.css";
 
 const FURTHER_FLIGHTS = 3;
 
-const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meaning: string }> = {
-  candidate: { word: "Candidate", meaning: "not yet confirmed by repeat flights." },
-  confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
-  "not confirmed": { word: "Not confirmed", meaning: "no improvement over the first gains in repeat flights." },
+const STANDINGS: Record<NonNullable<Campaign["standing"]>, [word: string, meaning: string]> = {
+  candidate: ["Candidate", "not yet confirmed by repeat flights."],
+  confirmed: ["Confirmed", "better than the first gains in repeat flights."],
+  "not confirmed": ["Not confirmed", "no improvement over the first gains in repeat flights."],
 };
 
 interface Props {
@@ -39,27 +38,26 @@ interface Props {
 export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
   const reopen = useReopen(campaign.id);
   const { data: statistics, isPending } = useStatistics(campaign.id);
-  const groups = statistics?.groups ?? [];
-  const [winner, first] = [groups.find(({ is_best }) => is_best), groups.find(({ is_baseline }) => is_baseline)];
+  const { groups, comparison, drift } = statistics ?? { groups: [], comparison: null, drift: null };
+  const winner = groups.find(({ is_best }) => is_best);
+  const first = groups.find(({ is_baseline }) => is_baseline);
   const missing = campaign.standing === "candidate" ? confirmationOf(winner, first) : [];
   const wanted = missing.flatMap((kind) => (kind === "repeat" ? winner : first) ?? []).map(({ gains }) => gains);
   const refusal = useGateRefusal(campaign.id, wanted);
   const isCandidate = missing.length > 0 && refusal === "";
-  const further = isCandidate ? missing.length : FURTHER_FLIGHTS;
-  const experiment = campaign.definition.experiment ?? "";
   const bestFlight = winner === undefined ? null : bestFlightOf(winner);
   const title = campaignStateLabel({ ...campaign, state: "finished", rehearsal: "not needed" }).word;
-  const reason = endingOf(campaign, statistics?.comparison ?? null);
+  const reason = endingOf(campaign, comparison);
   return (
     <Panel title={title}>
       <Stack gap={14}>
         {reason.toLowerCase() !== title.toLowerCase() && <Note fz="body">{reason}</Note>}
         {winner !== undefined && first !== undefined && (
-          <Result campaign={campaign} winner={winner} first={first} comparison={statistics?.comparison ?? null} />
+          <Result campaign={campaign} winner={winner} first={first} comparison={comparison} />
         )}
-        {statistics?.drift?.resolved && (
+        {drift?.resolved && (
           <Aside tone="warn" fz="small">
-            {statistics.drift.sentence}
+            {drift.sentence}
           </Aside>
         )}
         {isCandidate && <Note fz="body">{confirmationText(missing)}</Note>}
@@ -73,9 +71,11 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
             variant={isCandidate && !isSecondary ? "filled" : "default"}
             leftSection={<IconRepeat size={20} aria-hidden />}
             loading={reopen.isPending}
-            onClick={() => reopen.mutate({ flights: further, plan: missing })}
+            onClick={() => reopen.mutate({ flights: isCandidate ? missing.length : FURTHER_FLIGHTS, plan: missing })}
           >
-            {isCandidate ? `Confirm with ${count(further, "flight")}` : `Reopen for ${further} more flights`}
+            {isCandidate
+              ? `Confirm with ${count(missing.length, "flight")}`
+              : `Reopen for ${FURTHER_FLIGHTS} more flights`}
           </Button>
         )}
         <ErrorNotice error={reopen.error} />
@@ -86,7 +86,7 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
         )}
         <PromoteGains campaign={campaign} />
         <Note fz="body">A clone is a new campaign with the same settings.</Note>
-        <CloneForm {...campaign} experiment={experiment} bestFlight={bestFlight} />
+        <CloneForm {...campaign} experiment={campaign.definition.experiment ?? ""} bestFlight={bestFlight} />
         {campaign.actions.includes("archive") && <ArchiveCampaign campaignId={campaign.id} />}
       </Stack>
     </Panel>
@@ -110,14 +110,15 @@ function Result({ campaign, winner, first, comparison }: ResultProps) {
   const experiment = campaign.definition.experiment ?? "";
   const unit = useUnits(experiment).error;
   const change = percentChange(winner.mean, first.mean);
+  const standing = campaign.standing && STANDINGS[campaign.standing];
   return (
-    <Aside tone="good" className={`${classes["best"]} numbers`}>
+    <Aside tone="good" className="numbers">
       <p>Best gains ({flightsText(winner.trial_numbers)})</p>
-      <p className={classes["figure"]}>{plusMinus(winner.mean, winner.standard_error, unit)}</p>
+      <Text fz="var(--text-figure)" fw={650} my={4} lh="inherit">
+        {plusMinus(winner.mean, winner.standard_error, unit)}
+      </Text>
       {winner.standard_error !== null && <p>{winner.errors.length > 1 ? "mean " : ""}± standard error</p>}
-      <p>
-        <GainList gains={winner.gains} experiment={experiment} />
-      </p>
+      <GainList gains={winner.gains} experiment={experiment} />
       {change !== null && comparison !== null && (
         <>
           <p>
@@ -133,9 +134,9 @@ function Result({ campaign, winner, first, comparison }: ResultProps) {
           </p>
         </>
       )}
-      {campaign.standing !== null && (
+      {standing && (
         <p>
-          <strong>{STANDINGS[campaign.standing].word}</strong>: {STANDINGS[campaign.standing].meaning}
+          <strong>{standing[0]}</strong>: {standing[1]}
         </p>
       )}
     </Aside>

@@ -7,30 +7,34 @@ import { isSaturated, outputNow, readingOf, throttleNow } from "../../../live/te
 import { isAfterRecord } from "../../../live/vehicleStatus";
 import { withUnit } from "../../../ui/format";
 import { GainList } from "../../../ui/gains";
+import { LabelledValue } from "../../../ui/LabelledValue";
 import { Note } from "../../../ui/Note";
 import { Panel } from "../../../ui/Panel";
-import { intervalText, percentOrNothing } from "../../../ui/uncertainty";
+import { percentOrNothing } from "../../../ui/uncertainty";
 import { useUnits } from "../../../ui/units";
 import { FlightMarkers } from "../flights/FlightMarkers";
+import { Predicted } from "./BeforeFlight";
 import classes from "./NextFlight.module.css";
 import { flyingStage, STAGED } from "./nextStep";
 
 interface Props {
   campaign: Campaign;
-  trial: Trial | undefined;
-  step: { trialId: number; trialNumber: number };
+  trials: readonly Trial[];
+  flight: NonNullable<Campaign["flying"]>;
 }
 
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */
-export function FlyingCard({ campaign, trial, step }: Props) {
+export function FlyingCard({ campaign, trials, flight }: Props) {
+  const { trial_id: trialId, trial_number: number } = flight;
+  const trial = trials.find(({ id }) => id === trialId);
   const abort = useOutletContext<AbortControl>();
   const { state, worker } = useConnection();
-  const live = useLiveFlight(step.trialId);
+  const live = useLiveFlight(trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
   const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
-  const aborting = abortStage(step.trialId, abort, status?.status.step);
+  const aborting = abortStage(trialId, abort, status?.status.step);
   const isUnscored = isCutShort(aborting, status?.status.step);
   const stage = flyingStage(trial, live);
   const isAfter = isAfterRecord(status?.status.step);
@@ -38,35 +42,29 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const isStale = !useIsOutputCurrent(live, status) && hasOutput;
   return (
     <Panel
-      title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
+      title={`Flight ${number}: ${stage.toLowerCase()}`}
       tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
     >
       <Stack gap={14}>
-        <dl className={`${classes["big"]} numbers`}>
-          <div className={classes["reading"]} data-wide data-stale={isStale || undefined}>
-            <dt>{isStale ? `${reading.title}, last known` : reading.title}</dt>
-            <dd>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</dd>
-          </div>
-          <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>{isUnscored ? "Error" : "Error so far"}</dt>
-            <dd>{isUnscored ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
-          </div>
-          <div className={classes["reading"]}>
-            <dt>Predicted error</dt>
-            <dd>
-              {withUnit(trial?.predicted_error, unit)}{" "}
-              {trial?.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
-            </dd>
-          </div>
-          <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>Time</dt>
-            <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
-          </div>
+        <dl className={`${classes["values"]} ${classes["live"]} numbers`}>
+          <LabelledValue
+            title={isStale ? `${reading.title}, last known` : reading.title}
+            value={withUnit(outputNow(live, status), reading.unit, reading.digits)}
+            stale={isStale}
+          />
+          <LabelledValue
+            title={isUnscored ? "Error" : "Error so far"}
+            value={isUnscored ? "not scored" : withUnit(live?.errorSoFar, unit)}
+            stale={isStale}
+          />
+          <LabelledValue title="Predicted error" value={<Predicted trial={trial} unit={unit} />} />
+          <LabelledValue title="Time" value={withUnit(live?.timeS.at(-1), "s", 1)} stale={isStale} />
           {live !== null && live.throttle !== null && (
-            <div className={classes["reading"]} data-stale={isStale || undefined}>
-              <dt>{isSaturated(live) && !isAfter ? "Throttle, saturated" : "Throttle"}</dt>
-              <dd>{percentOrNothing(throttleNow(live, status))}</dd>
-            </div>
+            <LabelledValue
+              title={isSaturated(live) && !isAfter ? "Throttle, saturated" : "Throttle"}
+              value={percentOrNothing(throttleNow(live, status))}
+              stale={isStale}
+            />
           )}
         </dl>
         {trial && (
@@ -76,7 +74,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </Note>
         )}
         {registered && (
-          <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
+          <Button component={Link} to={`/fly/${trialId}`} size="lg">
             Open fly screen
           </Button>
         )}

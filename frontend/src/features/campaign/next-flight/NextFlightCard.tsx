@@ -1,7 +1,7 @@
-import { Button, Loader, Stack, Text } from "@mantine/core";
+import { Button, Group, Loader, Stack, Text } from "@mantine/core";
 import { useRecompute, useUploadRecord } from "../../../api/mutations";
 import { useCampaign } from "../../../api/queries";
-import type { NextFlight } from "../../../api/types";
+import type { Trouble } from "../../../api/types";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { ProposalCard } from "../proposal/ProposalCard";
@@ -9,7 +9,6 @@ import type { ShowPreview } from "../proposal/useChosenFlight";
 import type { CampaignStatus } from "../useCampaignStatus";
 import { FinishedCard } from "./FinishedCard";
 import { FlyingCard } from "./FlyingCard";
-import classes from "./NextFlight.module.css";
 import { nextStep } from "./nextStep";
 import { PlannedCard } from "./PlannedCard";
 import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
@@ -45,7 +44,7 @@ function Step(props: Props & { isSecondary?: boolean }) {
   const upload = useUploadRecord(campaign.id);
   switch (step.kind) {
     case "flying":
-      return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
+      return <FlyingCard campaign={campaign} trials={trials} flight={step.flight} />;
     case "finished":
       return <FinishedCard campaign={campaign} onChoose={onChoose} isSecondary={isSecondary} />;
     case "rehearse":
@@ -53,7 +52,6 @@ function Step(props: Props & { isSecondary?: boolean }) {
     case "planned":
       return <PlannedCard campaign={campaign} trial={step.trial} upload={upload} />;
     case "propose":
-    case "nothing better":
       return (
         <ProposalCard
           key={step.proposal.id}
@@ -79,33 +77,31 @@ function Step(props: Props & { isSecondary?: boolean }) {
         </Panel>
       );
     case "failed":
-      return <FailedCard campaignId={campaign.id} next={next} />;
+      return <FailedCard campaignId={campaign.id} problem={step.problem ?? UNKNOWN} />;
     case "computing":
       return (
         <Panel title="Next flight">
-          <div className={classes["computing"]} role="status">
+          <Group wrap="nowrap" mih={160} lh={1.45} role="status">
             <Loader size="md" aria-hidden />
             <p>
               <strong>Computing the next gains</strong>
               <br />
               from {trials.length === 0 ? "the start settings" : "all flights so far"}. This takes about a second.
             </p>
-          </div>
+          </Group>
         </Panel>
       );
   }
 }
 
-function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight }) {
+const UNKNOWN: Trouble = { title: "The next gains could not be computed.", detail: "", hint: "" };
+
+function FailedCard({ campaignId, problem }: { campaignId: number; problem: Trouble }) {
   const recompute = useRecompute(campaignId);
   return (
     <Panel title="Next flight">
       <Stack gap={14}>
-        <div role="alert" className={classes["failed"]}>
-          <strong>{next.problem?.title ?? "The next gains could not be computed."}</strong>
-          <p>{next.problem?.detail}</p>
-          <p>{next.problem?.hint}</p>
-        </div>
+        <ErrorNotice error={{ ...problem, status: 0, problems: [] }} />
         <Button loading={recompute.isPending} onClick={() => recompute.mutate()}>
           Compute again
         </Button>

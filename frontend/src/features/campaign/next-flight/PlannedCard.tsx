@@ -3,21 +3,17 @@ import { IconPlaneDeparture } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../../api/mutations";
 import type { Campaign, Trial } from "../../../api/types";
-import { gainText, withUnit } from "../../../ui/format";
+import { gainText } from "../../../ui/format";
+import { LabelledValue } from "../../../ui/LabelledValue";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
-import { intervalText } from "../../../ui/uncertainty";
 import { useGainTitles, useUnits } from "../../../ui/units";
 import { FlightMarkers } from "../flights/FlightMarkers";
 import { ImportRecord } from "../flights/ImportRecord";
-import { FlightProblem, FlightWindow, GroundedNote, useGroundedReason } from "./BeforeFlight";
+import { FlightProblem, FlightWindow, GroundedNote, Predicted, useGroundedReason } from "./BeforeFlight";
 import classes from "./NextFlight.module.css";
-import { watched } from "./nextStep";
-import { SpeedSwitch } from "./SpeedSwitch";
-import { speedOf, useSpeed } from "./speed";
-
-/** Letters of a gain's name, above which it needs a wider tile. */
-const LONG = 8;
+import { scrollUpOnceBegun } from "./nextStep";
+import { SpeedSwitch, useSpeed } from "./speed";
 
 interface Props {
   campaign: Campaign;
@@ -27,37 +23,35 @@ interface Props {
 
 /** A planned trial: fly it, upload its record, or cancel it. */
 export function PlannedCard({ campaign, trial, upload }: Props) {
-  const [speed, setSpeed] = useSpeed();
+  const speed = useSpeed();
   const experiment = campaign.definition.experiment ?? "";
   const unit = useUnits(experiment).error;
   const titles = useGainTitles(experiment);
   const fly = useFlyTrial(campaign);
   const cancel = useCancelTrial();
   const { can_fly, id, needs_staging, registered } = campaign.vehicle;
-  const isLong = Object.keys(trial.gains).some((name) => name.length > LONG);
   const isGrounded = useGroundedReason(id) !== "";
   return (
     <Panel title={`Flight ${trial.number} is planned`} tools={<FlightMarkers trial={trial} />}>
       <Stack gap={14}>
-        <dl className={`${classes["big"]} numbers`} data-long={isLong || undefined}>
+        <dl className={`${classes["values"]} numbers`}>
           {Object.entries(trial.gains).map(([name, value]) => (
-            <div key={name} className={classes["reading"]}>
-              <dt>
-                {name} {titles[name] && <small>{titles[name]}</small>}
-              </dt>
-              <dd title={String(value)}>{gainText(value)}</dd>
-            </div>
+            <LabelledValue
+              key={name}
+              title={
+                <>
+                  {name} <small>{titles[name]}</small>
+                </>
+              }
+              value={<span title={String(value)}>{gainText(value)}</span>}
+            />
           ))}
-          {trial.predicted_error !== null && (
-            <div className={classes["reading"]} data-row>
-              <dt>Predicted error</dt>
-              <dd>
-                {withUnit(trial.predicted_error, unit)}{" "}
-                {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
-              </dd>
-            </div>
-          )}
         </dl>
+        {trial.predicted_error !== null && (
+          <dl className={`${classes["values"]} numbers`}>
+            <LabelledValue title="Predicted error" value={<Predicted trial={trial} unit={unit} />} />
+          </dl>
+        )}
         <FlightWindow definition={campaign.definition} />
         <FlightProblem flight={trial.flight} />
         {can_fly ? (
@@ -69,7 +63,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 leftSection={<IconPlaneDeparture size={22} aria-hidden />}
                 loading={fly.isPending}
                 disabled={!trial.actions.includes("fly") || isGrounded}
-                onClick={() => watched(fly.mutateAsync({ trialId: trial.id, speed: speedOf(speed) }))}
+                onClick={() => scrollUpOnceBegun(fly.mutateAsync({ trialId: trial.id, speed }))}
               >
                 Fly flight {trial.number}
               </Button>
@@ -85,11 +79,11 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 Open fly screen
               </Button>
             ) : (
-              <SpeedSwitch value={speed} onChange={setSpeed} />
+              <SpeedSwitch />
             )}
           </>
         ) : (
-          <ImportRecord upload={upload} trialId={trial.id} />
+          <ImportRecord upload={upload} target={{ trialId: trial.id }} />
         )}
         <Button
           variant="default"

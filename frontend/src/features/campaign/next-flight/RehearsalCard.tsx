@@ -7,7 +7,7 @@ import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { useHasModel } from "../../../ui/units";
-import classes from "./NextFlight.module.css";
+import page from "../CampaignPage.module.css";
 
 /** Next action of a real vehicle's campaign that has not passed its rehearsal. */
 export function RehearsalCard({ campaign }: { campaign: Campaign }) {
@@ -52,13 +52,6 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   );
 }
 
-const WRAPPED = {
-  h: "auto",
-  mih: 56,
-  py: 8,
-  styles: { root: { display: "grid", placeItems: "center" }, label: { whiteSpace: "normal" } },
-} as const;
-
 const STANDING: Partial<Record<Campaign["rehearsal"]["state"], string>> = {
   missing: "Not passed yet:",
   "under way": "In progress:",
@@ -70,22 +63,20 @@ export function RehearsalNote({ real }: { real: Campaign }) {
   if (real.rehearsal.state === "passed") {
     return (
       <Panel title="Rehearsal passed">
-        <Button component={Link} to={`/campaigns/${real.id}`} fullWidth size="lg" {...WRAPPED}>
+        <Button component={Link} to={`/campaigns/${real.id}`} fullWidth size="lg" className={page["wrapping"] ?? ""}>
           Open {real.name}
         </Button>
       </Panel>
     );
   }
   return (
-    <Aside tone="good" className={classes["advice"] ?? ""}>
+    <Aside tone="good" fz="small">
+      <strong>This is a rehearsal</strong>
       <p>
-        <strong>This is a rehearsal</strong>
-        <span>
-          It must pass before the real vehicle can fly:{" "}
-          <Anchor component={Link} to={`/campaigns/${real.id}`}>
-            {real.name}
-          </Anchor>
-        </span>
+        It must pass before the real vehicle can fly:{" "}
+        <Anchor component={Link} to={`/campaigns/${real.id}`} inherit>
+          {real.name}
+        </Anchor>
       </p>
     </Aside>
   );

@@ -3,13 +3,13 @@
 import type { Campaign, CampaignStatistics, RepeatGroup } from "../../../api/types";
 import { count } from "../../../ui/format";
 
-type Repeated = Pick<RepeatGroup, "errors">;
+type Repeated = Pick<RepeatGroup, "errors"> | undefined;
 type Variant = "repeat" | "baseline";
 
 /** The flights that are missing until the best and the first gains have each flown twice. */
-export function confirmationOf(winner: Repeated | undefined, first: Repeated | undefined): Variant[] {
-  const missing = (variant: Variant, group: Repeated | undefined) =>
-    Array<Variant>(group === undefined ? 0 : Math.max(0, 2 - group.errors.length)).fill(variant);
+export function confirmationOf(winner: Repeated, first: Repeated): Variant[] {
+  const missing = (variant: Variant, group: Repeated) =>
+    Array<Variant>(Math.max(0, 2 - (group?.errors.length ?? 2))).fill(variant);
   return [...missing("repeat", winner), ...missing("baseline", first)];
 }
 

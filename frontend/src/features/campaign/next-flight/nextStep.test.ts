@@ -8,6 +8,7 @@ const campaign = {
   best: { trial_id: 7 },
   rehearsal: { state: "not needed" },
 } as unknown as Campaign;
+const flying = { ...campaign, flying: { trial_id: 8, trial_number: 2 } };
 const proposal = { kind: "step", recommended: "step", stale: false } as unknown as Proposal;
 const ready: NextFlight = { state: "ready", proposal, problem: null };
 const trial = (id: number, state: Trial["state"]): Trial => ({ id, state }) as unknown as Trial;
@@ -17,8 +18,7 @@ test("a fresh proposal is what to do next", () => {
 });
 
 test("what flies comes before everything else", () => {
-  const flying = { ...campaign, flying: { trial_id: 8, trial_number: 2 } };
-  expect(nextStep(flying, ready, [trial(8, "flying")])).toEqual({ kind: "flying", trialId: 8, trialNumber: 2 });
+  expect(nextStep(flying, ready, [trial(8, "flying")])).toEqual({ kind: "flying", flight: flying.flying });
 });
 
 test("a flight is in flight from its takeoff on, as the bar says, even before the first sample", () => {
@@ -32,7 +32,6 @@ test("a flight is in flight from its takeoff on, as the bar says, even before th
 });
 
 test("a flight that has landed is not flying any more, even if the campaign is not up to date yet", () => {
-  const flying = { ...campaign, flying: { trial_id: 8, trial_number: 2 } };
   expect(nextStep(flying, ready, [trial(8, "valid")])).toEqual({ kind: "computing" });
   expect(nextStep(flying, ready, [trial(8, "captured")])).toEqual({ kind: "judge", trial: trial(8, "captured") });
 });
@@ -61,19 +60,9 @@ test("a planned trial waits for its flight or its record", () => {
   expect(nextStep(campaign, ready, [planned])).toEqual({ kind: "planned", trial: planned });
 });
 
-test("a proposal that could not be computed says why", () => {
+test.each(["failed", "none"] as const)("gains that could not be computed (%s) can be asked for again", (state) => {
   const problem = { title: "No.", detail: "", hint: "" };
-  expect(nextStep(campaign, { state: "failed", proposal: null, problem }, [])).toEqual({ kind: "failed", problem });
-});
-
-test("a computation that was cancelled can be asked for again", () => {
-  const problem = { title: "There is no proposal for the present flights.", detail: "", hint: "" };
-  expect(nextStep(campaign, { state: "none", proposal: null, problem }, [])).toEqual({ kind: "failed", problem });
-});
-
-test("a strategy with nothing better to offer is not flown by default", () => {
-  const none = { ...proposal, kind: "none" } as Proposal;
-  expect(nextStep(campaign, { ...ready, proposal: none }, [])).toEqual({ kind: "nothing better", proposal: none });
+  expect(nextStep(campaign, { state, proposal: null, problem }, [])).toEqual({ kind: "failed", problem });
 });
 
 test("a finished campaign offers no flight", () => {

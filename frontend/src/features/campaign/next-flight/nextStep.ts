@@ -5,12 +5,11 @@ import type { LiveFlight } from "../../../live/telemetry";
 import { wasFlown } from "../../../ui/states";
 
 export type NextStep =
-  | { kind: "flying"; trialId: number; trialNumber: number }
+  | { kind: "flying"; flight: NonNullable<Campaign["flying"]> }
   | { kind: "judge"; trial: Trial }
   | { kind: "rehearse" }
   | { kind: "planned"; trial: Trial }
   | { kind: "propose"; proposal: Proposal }
-  | { kind: "nothing better"; proposal: Proposal }
   | { kind: "computing" }
   | { kind: "failed"; problem: Trouble | null }
   | { kind: "finished" };
@@ -33,9 +32,7 @@ export function hasLanded({ flying }: Campaign, trials: readonly Trial[]): boole
 export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly Trial[]): NextStep {
   const { flying } = campaign;
   const landed = hasLanded(campaign, trials);
-  if (flying !== null && !landed) {
-    return { kind: "flying", trialId: flying.trial_id, trialNumber: flying.trial_number };
-  }
+  if (flying !== null && !landed) return { kind: "flying", flight: flying };
   const unjudged = trials.find((trial) => trial.state === "captured" || trial.state === "lost");
   if (unjudged !== undefined) return { kind: "judge", trial: unjudged };
   // The list of flights is newer than the campaign: the campaign and its proposal are stale.
@@ -45,8 +42,10 @@ export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly 
   const planned = trials.find((trial) => trial.state === "planned" || trial.state === "staged");
   if (planned !== undefined) return { kind: "planned", trial: planned };
   if (next.state === "failed" || next.state === "none") return { kind: "failed", problem: next.problem };
-  if (next.state === "ready" && next.proposal !== null && !next.proposal.stale) return offered(next.proposal);
-  return { kind: "computing" };
+  const { proposal } = next;
+  return proposal === null || proposal.stale || next.state !== "ready"
+    ? { kind: "computing" }
+    : { kind: "propose", proposal };
 }
 
 /** Whether the campaign must pass a rehearsal before its real vehicle may fly. */
@@ -54,13 +53,8 @@ export function wantsRehearsal({ rehearsal }: Campaign): boolean {
   return rehearsal.state !== "not needed" && rehearsal.state !== "passed";
 }
 
-function offered(proposal: Proposal): NextStep {
-  if (proposal.kind === "none" || proposal.recommended === "stop") return { kind: "nothing better", proposal };
-  return { kind: "propose", proposal };
-}
-
 /** Shows the top of the page, where the flight is watched, once it has begun; a refusal is told where it was ordered. */
-export function watched(flight: Promise<unknown>): void {
+export function scrollUpOnceBegun(flight: Promise<unknown>): void {
   flight.then(
     () => window.scrollTo({ top: 0 }),
     () => undefined,

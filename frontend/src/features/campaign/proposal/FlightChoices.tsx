@@ -1,7 +1,7 @@
 import { Chip, Group } from "@mantine/core";
 import type { Proposal } from "../../../api/types";
-import classes from "../next-flight/NextFlight.module.css";
 import { CHOICES, type ChoiceName } from "./choices";
+import classes from "./Proposal.module.css";
 
 interface Props {
   proposal: Proposal;

@@ -1,8 +1,8 @@
-import { TextInput } from "@mantine/core";
+import { Text, TextInput } from "@mantine/core";
 import { Fragment } from "react";
 import { gainText } from "../../../ui/format";
-import classes from "../next-flight/NextFlight.module.css";
 import { changeText, type GainRow, placeIn, sliderStep } from "./gainRows";
+import classes from "./Proposal.module.css";
 
 export interface GainEntry {
   texts: Readonly<Record<string, string>>;
@@ -17,82 +17,70 @@ interface Props {
   /** Whose gains the first column shows. */
   from: "Best gains" | "Best in bounds" | "Safe gains";
   unit: string;
-  titles: Readonly<Record<string, string>>;
   /** Makes the next gains inputs. */
   entry?: GainEntry | undefined;
 }
 
-/** More gains than this are shown without their titles where the screen is low. */
-const FEW = 3;
-
 /** Gains of the best flight, else the vehicle's safe ones, and next, with the change of each as a factor and within the bounds. */
-export function GainTable({ rows, from, unit, titles, entry }: Props) {
+export function GainTable({ rows, from, unit, entry }: Props) {
   return (
-    <table className={classes["gains"]} data-many={rows.length > FEW || undefined}>
+    <table className={classes["gains"]}>
       <caption className="visually-hidden">{from} and next gains</caption>
       <thead>
         <tr>
           <th scope="col">Gain{unit && ` (${unit})`}</th>
           <th scope="col">{from}</th>
           <th scope="col">Next</th>
-          <th scope="col" className={classes["delta"]}>
-            Change
-          </th>
+          <th scope="col">Change</th>
         </tr>
       </thead>
-      {rows.map((row) => (
-        <tbody key={row.name}>
-          <tr>
-            <th scope="row" title={titles[row.name]}>
-              <GainName name={row.name} /> {titles[row.name] && <small>{titles[row.name]}</small>}
-            </th>
-            <td className={classes["now"]} title={String(row.now)}>
-              {gainText(row.now)}
-            </td>
-            <td className={classes["next"]} title={row.next === null ? undefined : String(row.next)}>
-              {entry === undefined ? row.next !== null && gainText(row.next) : <NextInput name={row.name} {...entry} />}
-            </td>
-            <td className={classes["delta"]} data-same={row.next === row.now || undefined}>
-              {row.next !== null && changeText(row.now, row.next)}
-            </td>
-          </tr>
-          <tr>
-            <td colSpan={4}>
-              <Bounds row={row} title={titles[row.name] ?? ""} entry={entry} />
-              {entry?.reasons[row.name] && (
-                <small className={classes["reason"]} role="alert">
-                  {entry.reasons[row.name]}
-                </small>
-              )}
-            </td>
-          </tr>
-        </tbody>
-      ))}
+      {rows.map((row) => {
+        const { name, title, now, next } = row;
+        return (
+          <tbody key={name}>
+            <tr>
+              <th scope="row" title={title}>
+                <GainName name={name} /> {title && <small>{title}</small>}
+              </th>
+              <td title={String(now)}>{gainText(now)}</td>
+              <td title={next === null ? undefined : String(next)}>
+                {entry === undefined ? next !== null && gainText(next) : <NextInput name={name} {...entry} />}
+              </td>
+              <td data-same={next === now || undefined}>{next !== null && changeText(now, next)}</td>
+            </tr>
+            <tr>
+              <td colSpan={4}>
+                <Bounds row={row} onText={entry?.onText} />
+                {entry?.reasons[name] && (
+                  <Text c="error" fz="fine" ta="left" role="alert">
+                    {entry.reasons[name]}
+                  </Text>
+                )}
+              </td>
+            </tr>
+          </tbody>
+        );
+      })}
     </table>
   );
 }
 
 /** A long name breaks after an underscore. */
 function GainName({ name }: { name: string }) {
-  const [first, ...others] = name.split("_");
-  return (
-    <>
-      {first}
-      {others.map((part) => (
-        <Fragment key={part}>
-          _<wbr />
-          {part}
-        </Fragment>
-      ))}
-    </>
-  );
+  return name.split("_").map((part, index) => (
+    <Fragment key={part}>
+      {index > 0 && "_"}
+      {index > 0 && <wbr />}
+      {part}
+    </Fragment>
+  ));
 }
 
 function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name: string }) {
   return (
     <TextInput
       aria-label={name}
-      classNames={{ input: classes["entry"] ?? "" }}
+      className={classes["entry"] ?? ""}
       inputMode="decimal"
       autoComplete="off"
       value={texts[name] ?? ""}
@@ -103,23 +91,20 @@ function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name
 }
 
 /** The old and the new gain on a scale of the bounds; a slider where the gain may be changed. */
-function Bounds({ row, title, entry }: { row: GainRow; title: string; entry: GainEntry | undefined }) {
-  const { name, now, next, bounds } = row;
+function Bounds({ row, onText }: { row: GainRow; onText: GainEntry["onText"] | undefined }) {
+  const { name, title, now, next, bounds } = row;
   if (bounds === null) return null;
   const [from, to] = [placeIn(bounds, now), placeIn(bounds, next ?? now)];
   return (
-    <div className={classes["bounds"]} data-entry={entry !== undefined || undefined}>
-      <small className={classes["compactTitle"]} aria-hidden>
+    <div className={classes["bounds"]}>
+      <small className={classes["title"]} aria-hidden>
         {title}
       </small>
       <small>{gainText(bounds[0])}</small>
       <div className={classes["scale"]}>
-        <span
-          className={classes["moved"]}
-          style={{ insetInlineStart: `${Math.min(from, to)}%`, width: `${Math.abs(to - from)}%` }}
-        />
+        <span style={{ insetInlineStart: `${Math.min(from, to)}%`, width: `${Math.abs(to - from)}%` }} />
         <span className={classes["was"]} style={{ insetInlineStart: `${from}%` }} />
-        {entry === undefined ? (
+        {onText === undefined ? (
           <span className={classes["becomes"]} style={{ insetInlineStart: `${to}%` }} />
         ) : (
           <input
@@ -129,7 +114,7 @@ function Bounds({ row, title, entry }: { row: GainRow; title: string; entry: Gai
             max={bounds[1]}
             step={sliderStep(row)}
             value={next ?? now}
-            onChange={(event) => entry.onText(name, event.currentTarget.value)}
+            onChange={(event) => onText(name, event.currentTarget.value)}
           />
         )}
       </div>

@@ -1,142 +1,143 @@
-import { Button, Stack, TextInput } from "@mantine/core";
+import { Button, Group, Stack, Text, TextInput } from "@mantine/core";
 import { IconAlertTriangle, IconCircleCheck, IconCircleX } from "@tabler/icons-react";
-import { Fragment, useState } from "react";
-import { limitsOf, type Problem, reasonsOf } from "../../../api/problems";
+import { useState } from "react";
+import type { GainSet } from "../../../api/evaluation";
 import type { Check, Gate } from "../../../api/types";
 import { count, gainText } from "../../../ui/format";
 import { HelpTip } from "../../../ui/HelpTip";
 import { Note } from "../../../ui/Note";
-import classes from "../next-flight/NextFlight.module.css";
+import notices from "../../../ui/Notices.module.css";
+import page from "../CampaignPage.module.css";
+import { More } from "./More";
+import classes from "./Proposal.module.css";
 
-interface GateChecksProps {
-  gate: Gate | null;
-  /** Whether the result belongs to the gains shown. */
-  isCurrent?: boolean;
-}
-
-/** Gate checks of a flight: a summary line, and each check when opened or when one has failed. */
-export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
-  if (gate === null || !isCurrent) {
+/** Gate checks of a flight: a summary line, and each check when opened or when one has failed. Null while they run. */
+export function GateChecks({ gate }: { gate: Gate | null }) {
+  if (gate === null) {
     return (
-      <Note className={classes["checking"] ?? ""} role="status">
+      <Note className={classes["more"] ?? ""} mih={48} pt={12} role="status">
         Running the gate checks…
       </Note>
     );
   }
+  const all = gate.checks.length;
   const refused = gate.checks.filter((check) => !check.passed).length;
   const summary =
-    refused === 0
-      ? `${count(gate.checks.length, "check")} passed`
-      : gate.checks.length === 1
-        ? "1 check failed"
-        : `${refused} of ${gate.checks.length} checks failed`;
+    refused === 0 ? `${count(all, "check")} passed` : `${all === 1 ? "1 check" : `${refused} of ${all} checks`} failed`;
   return (
-    <details className={classes["more"]} open={refused > 0}>
-      <summary>{summary}</summary>
-      <div>
-        <ul className={classes["gate"]}>
-          {gate.checks.map((check) => {
-            const Icon = check.passed ? IconCircleCheck : IconCircleX;
-            return (
-              <li key={`${check.name} ${check.sentence}`} data-failed={!check.passed || undefined}>
-                <Icon size={19} aria-label={check.passed ? "passed" : "failed"} />
-                <span>
-                  {check.sentence}
-                  <Facts check={check} />
-                </span>
-              </li>
-            );
-          })}
-        </ul>
-        <Note fz="fine" mt={10}>
-          Checked before every flight, for proposed and custom gains.
-          <HelpTip topic="gate" />
-        </Note>
-      </div>
-    </details>
+    <More summary={summary} open={refused > 0}>
+      <Stack component="ul" gap={6} lh={1.4}>
+        {gate.checks.map((check) => {
+          const [Icon, result, color] = check.passed
+            ? [IconCircleCheck, "passed", "var(--best)"]
+            : [IconCircleX, "failed", "var(--bad)"];
+          return (
+            <Group key={`${check.name} ${check.sentence}`} component="li" gap={8} wrap="nowrap" align="start">
+              <Icon size={19} color={color} aria-label={result} />
+              <div>
+                {check.sentence}
+                <Note fz="fine" lh="inherit" className="numbers">
+                  {factsOf(check)}
+                </Note>
+              </div>
+            </Group>
+          );
+        })}
+      </Stack>
+      <Note fz="fine">
+        Checked before every flight, for proposed and custom gains.
+        <HelpTip topic="gate" />
+      </Note>
+    </More>
   );
 }
 
-/** The worst case of the check, and values that would pass. */
-function Facts({ check }: { check: Check }) {
-  const offered = Object.entries(check.offer ?? {}).map(([name, value]) => `${name} ${gainText(value)}`);
-  const parts = [
-    check.case && !check.sentence.includes(check.case) ? `simulated with ${check.case}` : "",
-    offered.length > 0 ? `would pass: ${offered.join(", ")}` : "",
-  ].filter((part) => part !== "");
-  return parts.length === 0 ? null : <small className="numbers">{parts.join(" · ")}</small>;
+function named(gains: GainSet): string {
+  return Object.entries(gains)
+    .map(([name, value]) => `${name} ${gainText(value)}`.replaceAll(" ", "\u00a0"))
+    .join(", ");
 }
 
-type Offer = [gain: string, value: number];
+/** The worst case of the check, and values that would pass. */
+function factsOf({ case: worst, sentence, offer }: Check): string {
+  const offered = named(offer);
+  return [worst && !sentence.includes(worst) ? `simulated with ${worst}` : "", offered && `would pass: ${offered}`]
+    .filter((part) => part !== "")
+    .join(" · ");
+}
+
+function sentencesOf(checks: readonly Check[]): string[] {
+  return [...new Set(checks.map(({ sentence }) => sentence))];
+}
 
 interface RefusalProps {
-  problem: Problem;
-  offers: Offer[];
-  onUse: (offers: readonly Offer[]) => void;
+  gate: Gate;
+  /** Takes over gains that would pass; undefined where none can be entered. */
+  onUse: ((gains: GainSet) => void) | undefined;
 }
 
 /** Main reason of a refusal and values that would pass; other failed checks are collapsed. */
-export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
-  const [first, ...reasons] = reasonsOf(problem);
-  const limits = limitsOf(problem);
-  const besides = limits.filter((limit) => limit !== first);
+export function GateRefusal({ gate, onUse }: RefusalProps) {
+  const failed = gate.checks.filter(({ passed }) => !passed);
+  const offering = failed.filter(({ offer }) => Object.keys(offer).length > 0);
+  const offer: GainSet = Object.assign({}, ...offering.map((check) => check.offer));
+  const [first = "", ...reasons] = sentencesOf(failed);
+  const limits = sentencesOf(offering);
   const others = reasons.filter((reason) => !limits.includes(reason));
   return (
-    <div className={`${classes["failed"]} ${classes["stack"]}`} role="alert">
-      <div>
-        <strong>{problem.detail || problem.title}</strong>
-        <p>{first}</p>
-      </div>
-      {offers.length > 0 && (
+    <div className={notices["trouble"]} role="alert">
+      <Stack gap={14} flex={1} miw={0}>
         <div>
-          <Button fullWidth variant="light" h="auto" onClick={() => onUse(offers)}>
-            <span className={classes["offer"]}>
-              Use{" "}
-              {offers.map(([name, value], index) => (
-                <Fragment key={name}>
-                  {index > 0 && ", "}
-                  <span>
-                    {name} {gainText(value)}
-                  </span>
-                </Fragment>
-              ))}
-            </span>
-          </Button>
-          <OfferNote several={offers.length > 1} above={limits.includes(first ?? "")} besides={besides} />
+          <strong>The gate refuses these gains.</strong>
+          <p>{first}</p>
         </div>
-      )}
-      {others.length > 0 && (
-        <details className={classes["more"]}>
-          <summary>{count(others.length, "more check")} failed</summary>
-          <ul className={classes["gate"]}>
-            {others.map((reason) => (
-              <li key={reason}>{reason}</li>
-            ))}
-          </ul>
-        </details>
-      )}
-      {problem.hint && <p className={classes["offerNote"]}>{problem.hint}</p>}
+        {onUse && limits.length > 0 && (
+          <div>
+            <Button fullWidth variant="light" className={page["wrapping"] ?? ""} onClick={() => onUse(offer)}>
+              Use {named(offer)}
+            </Button>
+            <OfferNote several={Object.keys(offer).length > 1} first={first} limits={limits} />
+          </div>
+        )}
+        {others.length > 0 && (
+          <More summary={`${count(others.length, "more check")} failed`}>
+            <ul>
+              {others.map((reason) => (
+                <li key={reason}>{reason}</li>
+              ))}
+            </ul>
+          </More>
+        )}
+        {onUse === undefined && <small>Select custom gains to fly others.</small>}
+      </Stack>
     </div>
   );
 }
 
+interface OfferNoteProps {
+  several: boolean;
+  /** The limit that the refusal names, if it is one of them. */
+  first: string;
+  limits: readonly string[];
+}
+
 /** Explains why the offered values can be below those that the refusal names: several limits apply at once. */
-function OfferNote({ several, above, besides }: { several: boolean; above: boolean; besides: readonly string[] }) {
+function OfferNote({ several, first, limits }: OfferNoteProps) {
+  const besides = limits.filter((limit) => limit !== first);
   const nearest = several ? "The closest values to yours that satisfy" : "The closest value to yours that satisfies";
-  const limits = above ? "the limit above and these:" : "these limits (the simulated checks are then repeated):";
+  if (besides.length === 0) return <p>{nearest} the limit above.</p>;
+  const these = limits.includes(first)
+    ? "the limit above and these:"
+    : "these limits (the simulated checks are then repeated):";
   return (
-    <>
-      <p className={classes["offerNote"]}>
-        {nearest} {besides.length > 0 ? limits : "the limit above."}
-      </p>
-      {besides.length > 0 && (
-        <ul className={classes["offerNote"]}>
-          {besides.map((limit) => (
-            <li key={limit}>{limit}</li>
-          ))}
-        </ul>
-      )}
-    </>
+    <Text component="div" fz="fine" mt={8}>
+      {nearest} {these}
+      <ul>
+        {besides.map((limit) => (
+          <li key={limit}>{limit}</li>
+        ))}
+      </ul>
+    </Text>
   );
 }
 
@@ -144,30 +145,27 @@ function OfferNote({ several, above, besides }: { several: boolean; above: boole
 export function OverruleGate({ pending, onFly }: { pending: boolean; onFly: (reason: string) => void }) {
   const [reason, setReason] = useState("");
   return (
-    <details className={classes["more"]}>
-      <summary>Overrule the gate</summary>
-      <Stack gap={14}>
-        <Note fz="body">
-          Refused gains can be flown on a simulated vehicle only. The reason is saved and shown with the flight.
-        </Note>
-        <TextInput
-          label="Reason"
-          placeholder="For example: the paper flew these gains"
-          value={reason}
-          maxLength={500}
-          onChange={(event) => setReason(event.currentTarget.value)}
-        />
-        <Button
-          color="red"
-          variant="outline"
-          leftSection={<IconAlertTriangle size={20} aria-hidden />}
-          disabled={reason.trim() === ""}
-          loading={pending}
-          onClick={() => onFly(reason.trim())}
-        >
-          Fly refused gains
-        </Button>
-      </Stack>
-    </details>
+    <More summary="Overrule the gate">
+      <Note fz="body">
+        Refused gains can be flown on a simulated vehicle only. The reason is saved and shown with the flight.
+      </Note>
+      <TextInput
+        label="Reason"
+        placeholder="For example: the paper flew these gains"
+        value={reason}
+        maxLength={500}
+        onChange={(event) => setReason(event.currentTarget.value)}
+      />
+      <Button
+        color="red"
+        variant="outline"
+        leftSection={<IconAlertTriangle size={20} aria-hidden />}
+        disabled={reason.trim() === ""}
+        loading={pending}
+        onClick={() => onFly(reason.trim())}
+      >
+        Fly refused gains
+      </Button>
+    </More>
   );
 }

@@ -1,19 +1,22 @@
-import { Stack } from "@mantine/core";
+import { Group } from "@mantine/core";
 import { IconFlagCheck, IconHome, IconRepeat, IconStairsUp } from "@tabler/icons-react";
-import type { Explanation, FittedParameter, Interval, Proposal } from "../../../api/types";
+import type { Explanation, FittedParameter, Proposal } from "../../../api/types";
 import { Aside } from "../../../ui/Aside";
-import { against, gainText, NOTHING, percentChange, withUnit } from "../../../ui/format";
+import { against, gainText, NOTHING, percentChange, trueMinus, withUnit } from "../../../ui/format";
 import { gainsInBrackets } from "../../../ui/gains";
 import { HelpTip } from "../../../ui/HelpTip";
 import { Note } from "../../../ui/Note";
+import { ScrollTable } from "../../../ui/ScrollTable";
+import table from "../../../ui/ScrollTable.module.css";
 import { intervalText, percent, plusMinus } from "../../../ui/uncertainty";
-import classes from "../next-flight/NextFlight.module.css";
 import { CHOICES, type ChoiceName, isDoubtful } from "./choices";
+import { Landscape } from "./Landscape";
+import { More } from "./More";
+import classes from "./Proposal.module.css";
+import type { ChosenFlight } from "./useChosenFlight";
 
 interface PredictedErrorProps {
-  predicted: { predicted_error: number | null; interval: Interval | null } | null;
-  /** Whether the prediction belongs to the gains shown. */
-  isCurrent: boolean;
+  prediction: ChosenFlight["prediction"];
   /** Mean error of the best gains; null if nothing is to be compared with it. */
   best: number | null;
   /** Whose error that is. */
@@ -33,18 +36,25 @@ function unpredicted(best: number | null, hasModel: boolean): string {
 }
 
 /** Predicted error with its interval; grey while it belongs to other gains. */
-export function PredictedError({ predicted, isCurrent, best, bestTitle, source, unit, hasModel }: PredictedErrorProps) {
-  const { predicted_error: error = null, interval = null } = predicted ?? {};
+export function PredictedError({ prediction, best, bestTitle, source, unit, hasModel }: PredictedErrorProps) {
+  const { result, isCurrent } = prediction;
+  const { predicted_error: error = null, interval = null } = result ?? {};
   const change = percentChange(error, best);
-  if (error === null && isCurrent) return <Note fz="body">{unpredicted(best, hasModel)}</Note>;
+  if (error === null && isCurrent) {
+    return (
+      <Note fz="body" className={hasModel ? "" : (classes["later"] ?? "")}>
+        {unpredicted(best, hasModel)}
+      </Note>
+    );
+  }
   return (
-    <div className={`${classes["predicted"]} numbers`} data-stale={!isCurrent || undefined} aria-busy={!isCurrent}>
-      <span>
+    <div className={`${classes["predicted"]} numbers`} aria-busy={!isCurrent}>
+      <Group gap={6} wrap="nowrap">
         {isCurrent ? "Predicted error" : "Updating…"}
         <HelpTip topic="predicted" />
-      </span>
+      </Group>
       <span>
-        <strong>{withUnit(error, unit)}</strong>
+        <strong className="quantity">{withUnit(error, unit)}</strong>
         {interval && (
           <small>
             {intervalText(interval, unit)}
@@ -66,56 +76,65 @@ interface ReasonProps {
   isFirst: boolean;
 }
 
-/** Why these gains: the advice where they are recommended, or to stop, otherwise what the choice is for. */
+/** Why these gains: the advice where they are recommended, or to stop, otherwise what the choice is for. A warning and
+ * the advice to stop come before the button on every screen. */
 export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
   const { kind, why } = proposal.advice;
+  const isStop = kind === "stop";
   const isRecommended = proposal.choices.some(({ kind: one, recommended }) => recommended && one === chosen);
-  if (chosen === "own" ? kind !== "stop" : isFirst && isRecommended) return null;
+  if (chosen === "own" ? !isStop : isFirst && isRecommended) return null;
   if (isDoubtful(proposal)) {
     return (
       <Aside tone="warn" fz="small">
-        {kind === "stop" && <strong>Recommended: stop the campaign. </strong>}
+        {isStop && <strong>Recommended: stop the campaign. </strong>}
         {why}
       </Aside>
     );
   }
-  const isRefused = isRecommended && chosen !== "own" && !proposal.gate.passed;
-  if (isRefused) return <Note fz="body">{why}</Note>;
-  if (!isRecommended && kind !== "stop") return <Note fz="body">{CHOICES[chosen].hint}</Note>;
+  const later = classes["later"] ?? "";
+  const { hint } = CHOICES[chosen];
+  if (!isStop && !(isRecommended && proposal.gate.passed)) {
+    return (
+      <Note fz="body" className={later}>
+        {isRecommended ? why : hint}
+      </Note>
+    );
+  }
   const Icon = ICONS[kind];
   return (
-    <Aside tone="good" className={classes["advice"] ?? ""} data-kind={kind}>
-      <Icon size={22} color="var(--best)" aria-hidden />
-      <p>
-        {kind === "stop" && <strong>Recommended: stop the campaign</strong>}
-        <span>{why || CHOICES[chosen].hint}</span>
-      </p>
+    <Aside tone="good" className={isStop ? "" : later} fz="small">
+      <Group wrap="nowrap" gap={10} align="start">
+        <Icon size={22} color="var(--best)" aria-hidden />
+        <div>
+          {isStop && <strong>Recommended: stop the campaign</strong>}
+          <p>{why || hint}</p>
+        </div>
+      </Group>
     </Aside>
   );
 }
 
-interface ProposalExplanationProps {
-  explanation: Explanation;
+interface ProposalDetailsProps {
+  proposal: Proposal;
+  campaignId: number;
   /** What the card says already. */
   said: string;
   unit: string;
-  gains: Readonly<Record<string, number>>;
+  hasModel: boolean;
 }
 
-/** Explanation of the proposed gains: summary, expected information, trust region, limits, fitted parameters. */
-export function ProposalExplanation({ explanation, said, unit, gains }: ProposalExplanationProps) {
+/** Details of the proposed gains: why these, what the model says of others, and the steps evaluated on it. */
+export function ProposalDetails({ proposal, campaignId, said, unit, hasModel }: ProposalDetailsProps) {
+  const { explanation, gains } = proposal;
   const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
-  const summary = said.includes(explanation.summary) ? [] : [explanation.summary];
+  const summary = said.includes(explanation.summary) ? "" : explanation.summary;
   const isModelled = Object.keys(explanation.gradient ?? {}).length > 0 || fitted.length > 0;
-  if (!isModelled && lesson === "" && summary.length + notes.length === 0) return null;
+  const isExplained = hasModel || notes.length > 0 || lesson !== "" || summary !== "";
   return (
     <>
-      <details className={classes["more"]}>
-        <summary>Explanation</summary>
-        <Stack gap={14}>
-          {summary.map((sentence) => (
-            <span key={sentence}>{sentence}</span>
-          ))}
+      {isExplained && (
+        <More summary="Explanation">
+          {summary && <span>{summary}</span>}
           {lesson && (
             <span>
               <strong>What this flight will show:</strong> {lesson}
@@ -134,8 +153,9 @@ export function ProposalExplanation({ explanation, said, unit, gains }: Proposal
             </span>
           ))}
           {fitted.length > 0 && <Fitted parameters={fitted} />}
-        </Stack>
-      </details>
+          {hasModel && <Landscape campaignId={campaignId} />}
+        </More>
+      )}
       <Tried explanation={explanation} unit={unit} gains={gains} />
     </>
   );
@@ -148,71 +168,69 @@ function withOwnUnit(text: string, unit: string): string {
 /** Fitted parameters of the vehicle, next to their values before the flights. */
 function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   return (
-    <table className={classes["ladder"]}>
-      <caption>
+    <div className="numbers">
+      <Note fz="fine">
         Fitted parameters (± standard error) <HelpTip topic="fitted" />
-      </caption>
-      {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
-        <tbody key={name}>
-          <tr>
-            <th colSpan={2} scope="rowgroup">
-              {withOwnUnit(title, unit)}
-            </th>
-          </tr>
-          <tr className={classes["fitted"]}>
-            <td>
-              fitted <strong>{plusMinus(value, standard_error, "")}</strong>
-            </td>
-            <td>prior {plusMinus(nominal, prior_sd, "")}</td>
-          </tr>
-        </tbody>
-      ))}
-    </table>
+      </Note>
+      <dl>
+        {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
+          <div key={name}>
+            <dt>{withOwnUnit(title, unit)}</dt>
+            <Group component="dd" gap="0 12px" justify="space-between" fz="fine">
+              <span>
+                fitted <strong>{plusMinus(value, standard_error, "")}</strong>
+              </span>
+              <span>prior {plusMinus(nominal, prior_sd, "")}</span>
+            </Group>
+          </div>
+        ))}
+      </dl>
+    </div>
   );
 }
 
-/** Details: the gradient, and the steps evaluated along it. */
-function Tried({ explanation, unit, gains }: Omit<ProposalExplanationProps, "said">) {
+interface TriedProps {
+  explanation: Explanation;
+  unit: string;
+  gains: Proposal["gains"];
+}
+
+/** The gradient, and the steps evaluated along it. */
+function Tried({ explanation, unit, gains }: TriedProps) {
   const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
   const slopes = Object.entries(gradient);
-  if (slopes.length === 0 && ladder.length === 0) return null;
+  if (slopes.length + ladder.length === 0) return null;
   return (
-    <details className={classes["more"]}>
-      <summary>{ladder.length > 0 ? "Steps evaluated on the model" : "Gradient of the error"}</summary>
-      <Stack gap={14}>
-        {slopes.length > 0 && (
-          <span className="numbers">
-            Gradient of the error:{" "}
-            {slopes.map(([name, value]) => `${name} ${value.toPrecision(2).replace("-", "−")}`).join(", ")} {unit} per
-            unit of the gain. <HelpTip topic="gradient" />
-          </span>
-        )}
-        {ladder.length > 0 && (
-          // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-          <section className={`${classes["wide"]} sideways`} aria-label="Steps evaluated on the model" tabIndex={0}>
-            <table className={classes["ladder"]}>
-              <thead>
-                <tr>
-                  <th scope="col">Step</th>
-                  <th scope="col">[{Object.keys(gains).join(" ")}]</th>
-                  <th scope="col">Predicted</th>
-                  <th scope="col">Limit</th>
-                </tr>
-              </thead>
-              <tbody>
-                {ladder.map((step) => (
-                  <tr key={step.length} data-chosen={step.length === chosen || undefined}>
-                    <td>{gainText(step.length)}</td>
-                    <td>{gainsInBrackets(step.gains)}</td>
-                    <td>{withUnit(step.predicted_error, unit)}</td>
-                    <td>{step.clipped?.join(", ") || NOTHING}</td>
-                  </tr>
-                ))}
-              </tbody>
-            </table>
-          </section>
-        )}
-      </Stack>
-    </details>
+    <More summary={ladder.length > 0 ? "Steps evaluated on the model" : "Gradient of the error"}>
+      {slopes.length > 0 && (
+        <span className="numbers">
+          Gradient of the error:{" "}
+          {slopes.map(([name, value]) => `${name} ${trueMinus(value.toPrecision(2))}`).join(", ")} {unit} per unit of
+          the gain. <HelpTip topic="gradient" />
+        </span>
+      )}
+      {ladder.length > 0 && (
+        <ScrollTable label="Steps evaluated on the model" className={`${table["numeric"]} ${classes["ladder"]}`}>
+          <thead>
+            <tr>
+              <th scope="col">Step</th>
+              <th scope="col">[{Object.keys(gains).join(" ")}]</th>
+              <th scope="col">Predicted</th>
+              <th scope="col">Limit</th>
+            </tr>
+          </thead>
+          <tbody>
+            {ladder.map((step) => (
+              <tr key={step.length} data-chosen={step.length === chosen || undefined}>
+                <td>{gainText(step.length)}</td>
+                <td>{gainsInBrackets(step.gains)}</td>
+                <td>{withUnit(step.predicted_error, unit)}</td>
+                <td>{step.clipped?.join(", ") || NOTHING}</td>
+              </tr>
+            ))}
+          </tbody>
+        </ScrollTable>
+      )}
+    </More>
   );
 }

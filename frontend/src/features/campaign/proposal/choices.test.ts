@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { FlightChoice, Proposal } from "../../../api/types";
-import { isDoubtful, preselected, refusalOf, repeatSource, trialOf } from "./choices";
+import { isDoubtful, preselected, repeatSource, trialOf } from "./choices";
 
 const first = { kp: 283, ki: 13 };
 const best = { kp: 900, ki: 200 };
@@ -52,18 +52,4 @@ test("start gains that were aborted because of them are doubtful", () => {
   expect(isDoubtful({ kind: "start", choices: [baseline] })).toBe(true);
   expect(isDoubtful({ kind: "start", choices: [{ ...baseline, recommended: true }] })).toBe(false);
   expect(isDoubtful({ kind: "step", choices: [baseline] })).toBe(false);
-});
-
-test("a refusal names the gains, the reasons, and what would pass", () => {
-  const bare = { worst: null, limit: null, gain: "", case: "", offer: {} };
-  const outside = { gain: "kp", offer: { kp: 4000 } };
-  const checks = [
-    { ...bare, name: "bounds", passed: false, sentence: "kp must be between 0 and 4000.", ...outside },
-    { ...bare, name: "altitude", passed: false, sentence: "It rises to 9 m." },
-    { ...bare, name: "wrapping", passed: true, sentence: "No product can wrap." },
-  ];
-  expect(refusalOf({ passed: false, checks }).problems).toEqual([
-    { field: "gains.kp", reason: "kp must be between 0 and 4000.", offer: { kp: 4000 } },
-    { field: "gains", reason: "It rises to 9 m." },
-  ]);
 });

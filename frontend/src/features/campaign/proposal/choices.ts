@@ -1,11 +1,8 @@
 /** What may be flown next: the proposal, its variants, or custom gains. */
 
 import type { GainSet } from "../../../api/evaluation";
-import type { Problem } from "../../../api/problems";
-import type { FlightChoice, Gate, NewTrial, Proposal, RepeatGroup } from "../../../api/types";
+import type { FlightChoice, NewTrial, Proposal, RepeatGroup } from "../../../api/types";
 import { flightsText } from "../../../ui/format";
-
-type FlownGains = Pick<RepeatGroup, "trial_numbers">;
 
 export type ChoiceName = FlightChoice["kind"] | "own";
 
@@ -33,7 +30,7 @@ export function isDoubtful({ kind, choices }: Pick<Proposal, "kind" | "choices">
 }
 
 /** The flights of these gains, whose mean is the prediction of a repeat. */
-export function repeatSource(name: ChoiceName, group: FlownGains | undefined): string {
+export function repeatSource(name: ChoiceName, group: Pick<RepeatGroup, "trial_numbers"> | undefined): string {
   if (!isRepeat(name) || group === undefined) return "";
   return `${group.trial_numbers.length > 1 ? "mean" : "error"} of ${flightsText(group.trial_numbers)} with these gains`;
 }
@@ -43,21 +40,4 @@ export function trialOf(proposal: Proposal, choice: FlightChoice | undefined, ga
   if (choice === undefined) return { gains };
   if (choice.proposed) return { proposal_id: proposal.id };
   return choice.kind === "step" ? { gains } : { variant: choice.kind, gains };
-}
-
-/** The gate's refusal in the form of a refused request. */
-export function refusalOf({ checks }: Gate): Problem {
-  return {
-    status: 422,
-    title: "The gate refuses these gains.",
-    detail: "",
-    hint: "",
-    problems: checks
-      .filter(({ passed }) => !passed)
-      .map(({ gain, sentence, offer = {} }) => ({
-        field: gain ? `gains.${gain}` : "gains",
-        reason: sentence,
-        ...(Object.keys(offer).length > 0 ? { offer } : {}),
-      })),
-  };
 }

@@ -8,14 +8,14 @@ const proposal = { changes } as unknown as Proposal;
 
 describe("a table of gains", () => {
   const known = [
-    { name: "kp", lower: 0, upper: 4000, integer: true },
-    { name: "ki", lower: 0, upper: 1073, integer: true },
+    { name: "kp", title: "Proportional gain", lower: 0, upper: 4000, integer: true },
+    { name: "ki", title: "Integral gain", lower: 0, upper: 1073, integer: true },
   ] as Gain[];
 
   test("has the campaign's bounds before the experiment's", () => {
     expect(gainRows(proposal, next, known, { kp: [100, 2000] })).toEqual([
-      { name: "kp", now: 900, next: 1200, bounds: [100, 2000], integer: true },
-      { name: "ki", now: 200, next: 250, bounds: [0, 1073], integer: true },
+      { name: "kp", title: "Proportional gain", now: 900, next: 1200, bounds: [100, 2000], integer: true },
+      { name: "ki", title: "Integral gain", now: 200, next: 250, bounds: [0, 1073], integer: true },
     ]);
   });
 

@@ -6,6 +6,8 @@ import { gainText, readNumber } from "../../../ui/format";
 
 export interface GainRow {
   name: string;
+  /** Empty until the catalogue is loaded. */
+  title: string;
   /** Of the best flight, else of the vehicle's safe gains. */
   now: number;
   /** Null while what is typed is no number. */
@@ -27,6 +29,7 @@ export function gainRows(
     const [lower = gain?.lower, upper = gain?.upper] = bounds[name] ?? [];
     return {
       name,
+      title: gain?.title ?? "",
       now,
       next: next[name] ?? null,
       bounds: lower === undefined || upper === undefined ? null : [lower, upper],
@@ -62,18 +65,13 @@ export function sliderStep({ integer, bounds }: GainRow): number {
 }
 
 /** Typed gains: the numbers, null for what is none, and the reasons. */
-export function readGains(
-  texts: Readonly<Record<string, string>>,
-  known: readonly Pick<Gain, "name" | "integer">[],
-): {
-  values: Record<string, number | null>;
-  reasons: Record<string, string>;
-  gains: GainSet | null;
-} {
+export function readGains(texts: Readonly<Record<string, string>>, known: readonly Pick<Gain, "name" | "integer">[]) {
   const isWhole = (name: string) => known.some((gain) => gain.name === name && gain.integer);
   const readings = Object.entries(texts).map(([name, text]) => [name, readNumber(text, isWhole(name))] as const);
-  const values = Object.fromEntries(readings.map(([name, { value }]) => [name, value ?? null]));
+  const values: Record<string, number | null> = Object.fromEntries(
+    readings.map(([name, { value }]) => [name, value ?? null]),
+  );
   const reasons = Object.fromEntries(readings.flatMap(([name, { reason }]) => (reason ? [[name, reason]] : [])));
   const isRead = Object.keys(reasons).length === 0;
-  return { values, reasons, gains: isRead ? (values as Record<string, number>) : null };
+  return { values, reasons, gains: isRead ? (values as GainSet) : null };
 }

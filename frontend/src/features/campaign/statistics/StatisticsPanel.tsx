@@ -1,8 +1,10 @@
-import { Stack } from "@mantine/core";
+import { Group, SimpleGrid, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
+import type { ReactNode } from "react";
 import { useStatistics } from "../../../api/queries";
 import type { CampaignStatistics, RepeatGroup } from "../../../api/types";
 import { Aside, toneOf } from "../../../ui/Aside";
+import type { Topic } from "../../../ui/explanations";
 import { count, flightNumbers, sharesText } from "../../../ui/format";
 import { gainsInBrackets } from "../../../ui/gains";
 import { HelpTip } from "../../../ui/HelpTip";
@@ -39,14 +41,14 @@ function Results(all: CampaignStatistics) {
   const shown = [comparison, drift, record, trend].map((one) => one?.sentence ?? "");
   return (
     <div className={classes["results"]}>
-      <div className={classes["facts"]}>
+      <SimpleGrid minColWidth="min(250px, 100%)" autoFlow="auto-fit" spacing={12}>
         <Verdict comparison={comparison} unit={all.error_unit} />
         <Scatter {...all} />
         <Predictions record={record} />
-      </div>
+      </SimpleGrid>
       <Stack gap={14}>
         <Groups {...all} />
-        <ul className={classes["notes"]}>
+        <Stack component="ul" gap={4} pl={20} c="dimmed" fz="small" lh={1.45}>
           {drift && (
             <li>
               {drift.sentence} <HelpTip topic="drift" />
@@ -58,66 +60,82 @@ function Results(all: CampaignStatistics) {
             .map((note) => (
               <li key={note}>{note}</li>
             ))}
-        </ul>
+        </Stack>
       </Stack>
     </div>
+  );
+}
+
+interface FactProps {
+  title: string;
+  topic?: Topic;
+  tone?: "good" | "bad" | undefined;
+  value: string;
+  /** What the value is. */
+  remark?: string | false;
+  children?: ReactNode;
+}
+
+/** One result, and what follows from it. */
+function Fact({ title, topic, tone, value, remark, children }: FactProps) {
+  return (
+    <Aside tone={tone} fz="body" lh={1.4} className="numbers">
+      <Text component="h3" c="dimmed" fz="small" fw={550}>
+        {title} {topic && <HelpTip topic={topic} />}
+      </Text>
+      <Text fz="title" fw={650} lh="inherit">
+        {value}
+        {remark && (
+          <Text span ms={8} c="dimmed" fz="small" fw={550}>
+            {remark}
+          </Text>
+        )}
+      </Text>
+      {children}
+    </Aside>
   );
 }
 
 function Verdict({ comparison, unit }: { comparison: CampaignStatistics["comparison"]; unit: string }) {
   if (comparison === null) {
     return (
-      <Aside className={classes["fact"] ?? ""}>
-        <h3>Best vs. baseline</h3>
-        <p className={classes["big"]}>Same gains</p>
-        <p>Nothing to compare: the first flight's gains are the best so far.</p>
-      </Aside>
+      <Fact title="Best vs. baseline" value="Same gains">
+        Nothing to compare: the first flight's gains are the best so far.
+      </Fact>
     );
   }
   const { verdict, confidence, difference, standard_error, further } = comparison;
-  const more = further === null ? null : further.best + further.baseline;
   return (
-    <Aside tone={toneOf(verdict)} className={classes["fact"] ?? ""}>
-      <h3>
-        Best vs. baseline
-        <HelpTip topic="difference" />
-      </h3>
-      <p className={classes["big"]}>
-        {VERDICTS[verdict]}
-        {confidence !== null && <small>{confidenceText(confidence)} confidence</small>}
-      </p>
-      <p className="numbers">
-        <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}
-        {difference < 0 ? "lower" : "higher"}
-        {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
-        {verdict === "unresolved" && more !== null && (
-          <strong className={classes["more"]}>
-            {count(more, "more flight")} needed:{" "}
-            {sharesText([further?.best ?? 0, "with the best gains"], [further?.baseline ?? 0, "with the first"])}
-          </strong>
-        )}
-      </p>
-    </Aside>
+    <Fact
+      title="Best vs. baseline"
+      topic="difference"
+      tone={toneOf(verdict)}
+      value={VERDICTS[verdict]}
+      remark={confidence !== null && `${confidenceText(confidence)} confidence`}
+    >
+      <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}
+      {difference < 0 ? "lower" : "higher"}
+      {verdict === "not known yet" && <Text fw={650}>Fly one of the two gain sets again</Text>}
+      {verdict === "unresolved" && further !== null && (
+        <Text fw={650}>
+          {count(further.best + further.baseline, "more flight")} needed:{" "}
+          {sharesText([further.best, "with the best gains"], [further.baseline, "with the first"])}
+        </Text>
+      )}
+    </Fact>
   );
 }
 
 function Scatter({ sigma, degrees_of_freedom: freedom, scatter_source: source, error_unit: unit }: CampaignStatistics) {
   return (
-    <Aside className={classes["fact"] ?? ""}>
-      <h3>
-        Flight-to-flight scatter
-        <HelpTip topic="scatter" />
-      </h3>
-      {!sigma ? (
-        <p className={classes["big"]}>{sigma === 0 ? "None" : "Not known yet"}</p>
-      ) : (
-        <p className={`${classes["big"]} numbers`}>
-          {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
-          <small>± standard error</small>
-        </p>
-      )}
-      <p>{source}</p>
-    </Aside>
+    <Fact
+      title="Flight-to-flight scatter"
+      topic="scatter"
+      value={sigma ? plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit) : sigma === 0 ? "None" : "Not known yet"}
+      remark={sigma ? "± standard error" : false}
+    >
+      {source}
+    </Fact>
   );
 }
 
@@ -132,22 +150,22 @@ function directionText({ of, agreeing, disagreeing, sentence }: CampaignStatisti
 
 function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
   return (
-    <Aside tone={record.trustworthy ? undefined : "bad"} className={classes["fact"] ?? ""}>
-      <h3>
-        Predictions inside their interval
-        <HelpTip topic="record" />
-      </h3>
-      <p className={`${classes["big"]} numbers`}>
-        {record.of === 0 ? "None yet" : `${record.inside} of ${record.of}`}
-        {record.of > 0 && <small>90&nbsp;% expected</small>}
-      </p>
+    <Fact
+      title="Predictions inside their interval"
+      topic="record"
+      tone={record.trustworthy ? undefined : "bad"}
+      value={record.of === 0 ? "None yet" : `${record.inside} of ${record.of}`}
+      remark={record.of > 0 && "90\u00a0% expected"}
+    >
       {!record.trustworthy && (
-        <p className={classes["warning"]}>
+        <Group gap={6} c="error" fw={650}>
           <IconAlertTriangle size={18} aria-hidden /> Gradient unreliable
-        </p>
+        </Group>
       )}
-      <p className={classes["fine"]}>{directionText(record)}</p>
-    </Aside>
+      <Note fz="fine" mt={6}>
+        {directionText(record)}
+      </Note>
+    </Fact>
   );
 }
 

@@ -1,4 +1,4 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Stack, TextInput } from "@mantine/core";
 import { IconShieldCheck } from "@tabler/icons-react";
 import { useState } from "react";
 import { usePromote } from "../../../api/mutations";
@@ -8,8 +8,8 @@ import { useVehicle } from "../../../api/vehicles";
 import { gainsInBrackets, sameHeld } from "../../../ui/gains";
 import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
-import classes from "../next-flight/NextFlight.module.css";
-import { heldGainsNotice, promotable } from "./promotion";
+import page from "../CampaignPage.module.css";
+import { heldGainsNotice, promotionRefusal } from "./promotion";
 
 /** Set the best gains as the vehicle's safe gains, once flights have shown that they are better. */
 export function PromoteGains({ campaign }: { campaign: Campaign }) {
@@ -18,8 +18,8 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
   const promote = usePromote(campaign);
   const vehicle = useVehicle(campaign.vehicle.registered ? campaign.vehicle.id : null);
   if (vehicle === null || campaign.winner === null) return null;
-  const { possible, why } = promotable(campaign.winner, vehicle);
-  if (!possible) {
+  const why = promotionRefusal(campaign.winner, vehicle);
+  if (why !== "") {
     const isDone = sameHeld(vehicle.safe_gains, campaign.winner.gains);
     return (
       <Note fz="body">
@@ -31,10 +31,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
     return (
       <Button
         variant="default"
-        h="auto"
-        mih={48}
-        py={8}
-        styles={{ label: { whiteSpace: "normal" } }}
+        className={page["wrapping"] ?? ""}
         leftSection={<IconShieldCheck size={20} aria-hidden />}
         onClick={() => setAsking(true)}
       >
@@ -43,8 +40,9 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
     );
   }
   return (
-    <form
-      className={classes["stack"]}
+    <Stack
+      component="form"
+      gap={14}
       onSubmit={(event) => {
         event.preventDefault();
         promote.mutate({ version: vehicle.version, statement }, { onSuccess: () => setAsking(false) });
@@ -68,6 +66,6 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
         Cancel
       </Button>
       <ErrorNotice error={promote.error} shown={["statement"]} />
-    </form>
+    </Stack>
   );
 }

@@ -1,30 +1,30 @@
-import { Anchor, Button, Group, Text } from "@mantine/core";
+import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconDownload, IconHelpHexagon, IconRepeat } from "@tabler/icons-react";
-import type { ReactNode } from "react";
 import { Link } from "react-router";
 import { useCreateTrial } from "../../../api/mutations";
 import { recordCsv, useCampaign, useStatistics } from "../../../api/queries";
 import type { Campaign, Trial } from "../../../api/types";
 import { Aside } from "../../../ui/Aside";
 import { StateBadge } from "../../../ui/Badges";
-import type { Topic } from "../../../ui/explanations";
 import { asSentence, flightsText, NOTHING, percentChange, percentText, withUnit } from "../../../ui/format";
 import { GainList } from "../../../ui/gains";
 import { HelpTip } from "../../../ui/HelpTip";
+import { LabelledValue } from "../../../ui/LabelledValue";
+import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { trialStateLabel } from "../../../ui/states";
 import { hasStepResponse, MEASURES, measureText } from "../../../ui/stepResponse";
 import { Time } from "../../../ui/Time";
 import { confidenceText, intervalText, plusMinus } from "../../../ui/uncertainty";
-import { useHasModel } from "../../../ui/units";
+import { useHasModel, useUnits } from "../../../ui/units";
 import { FlightMarkers, PredictionResult } from "../flights/FlightMarkers";
 import { FlightNotes, type NotePin } from "../flights/FlightNotes";
 import { AbortCause, FlightReview } from "../flights/FlightReview";
 import { standingWithout } from "../flights/review";
 import { comparisonAddress } from "../flights/useSelectedFlights";
-import { watched } from "../next-flight/nextStep";
-import { speedOf, useSpeed } from "../next-flight/speed";
+import { scrollUpOnceBegun } from "../next-flight/nextStep";
+import { useSpeed } from "../next-flight/speed";
 import { scatterMeaning } from "../statistics/scatter";
 import { PromoteGains } from "./PromoteGains";
 import classes from "./VerdictPanel.module.css";
@@ -33,11 +33,7 @@ import { bestBeforeOf, bestBeforeTitle, comparedWith, isScored, repeatPurpose, s
 interface Props {
   trial: Trial;
   trials: readonly Trial[];
-  isBest: boolean;
-  unit: string;
-  experiment: string;
-  /** Whether this is the flight's own page, which needs no link to itself. */
-  own?: boolean;
+  /** On the flight's own page, which needs no link to itself; null until a time has been selected. */
   pin?: NotePin | null;
 }
 
@@ -48,9 +44,9 @@ function Change({ error, other, unit }: { error: number | null; other: number | 
   if (withUnit(error, unit) === withUnit(other, unit)) return <small>this flight is the same</small>;
   const lower = percent < 0;
   return (
-    <small data-better={lower || undefined}>
+    <Text component="small" c={lower ? "var(--best)" : "dimmed"} fz="fine">
       this flight is {percentText(Math.abs(percent))} {lower ? "lower" : "higher"}
-    </small>
+    </Text>
   );
 }
 
@@ -59,29 +55,14 @@ function unpredicted(hasModel: boolean, isFirst: boolean): string {
   return isFirst ? "None before the first valid flight" : NOTHING;
 }
 
-interface FactProps {
-  title: string;
-  topic?: Topic;
-  wide?: boolean;
-  children: ReactNode;
-}
-
-function Fact({ title, topic, wide = false, children }: FactProps) {
-  return (
-    <div className={wide ? classes["wide"] : undefined}>
-      <dt>
-        {title} {topic && <HelpTip topic={topic} />}
-      </dt>
-      <dd>{children}</dd>
-    </div>
-  );
-}
-
 /** Result of a flight: compared with the best before it and with its prediction, and its review. */
-export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false, pin = null }: Props) {
+export function VerdictPanel({ trial, trials, pin }: Props) {
   const bestBefore = bestBeforeOf(trial, trials);
   const statistics = useStatistics(trial.campaign_id).data;
   const campaign = useCampaign(trial.campaign_id).data;
+  const isBest = trial.id === campaign?.best?.trial_id;
+  const experiment = campaign?.definition.experiment ?? "takeoff";
+  const unit = useUnits(experiment).error;
   const hasModel = useHasModel(experiment);
   const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
   const bestWord = group === undefined || group.is_best ? "best" : "lowest error";
@@ -93,20 +74,16 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
     <Panel
       title={`Flight ${trial.number}${isBest && trial.state === "valid" ? ` · ${bestWord} so far` : ""}`}
       tools={
-        <span className={classes["when"]}>
+        <Group gap="0 14px" c="dimmed" fz="small">
           <Time at={trial.flown_at} />
           <FlightMarkers trial={trial} />
           <StateBadge words={trialStateLabel(trial.state)} />
-        </span>
+        </Group>
       }
     >
-      {asked && (
-        <Text fz="body" lh={1.45} mb={4}>
-          {asked}
-        </Text>
-      )}
-      {!isScored(trial) && <p className={classes["sentence"]}>{asSentence(sentenceOf(trial))}</p>}
-      {isScored(trial) && trial.reason && <p className={classes["reason"]}>{asSentence(trial.reason)}</p>}
+      {asked && <Text fz="body">{asked}</Text>}
+      {!isScored(trial) && <Text fz="body">{asSentence(sentenceOf(trial))}</Text>}
+      {isScored(trial) && trial.reason && <Note fz="body">{asSentence(trial.reason)}</Note>}
       <AbortCause trial={trial} />
       <TrialComparisons trial={trial} best={bestBeforeTitle(trial, trials).toLowerCase()} unit={unit} />
       {trial.overrule_reason && (
@@ -115,46 +92,63 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Aside>
       )}
       <dl className={`${classes["figures"]} numbers`}>
-        <Fact title="Error" topic="error">
-          {plusMinus(trial.error, scatter, unit)}{" "}
-          {statistics && scatter ? <small>({scatterMeaning(statistics)})</small> : null}
-        </Fact>
-        <Fact title="Predicted" topic="predicted">
-          {trial.predicted_error === null
-            ? unpredicted(hasModel, bestBefore === null)
-            : withUnit(trial.predicted_error, unit)}{" "}
-          {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
-          <PredictionResult trial={trial} />
-        </Fact>
+        <LabelledValue
+          title="Error"
+          topic="error"
+          value={
+            <>
+              {plusMinus(trial.error, scatter, unit)}{" "}
+              {statistics && scatter ? <small>({scatterMeaning(statistics)})</small> : null}
+            </>
+          }
+        />
+        <LabelledValue
+          title="Predicted"
+          topic="predicted"
+          value={
+            <>
+              {trial.predicted_error === null
+                ? unpredicted(hasModel, bestBefore === null)
+                : withUnit(trial.predicted_error, unit)}{" "}
+              {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
+              <PredictionResult trial={trial} />
+            </>
+          }
+        />
         {bestBefore && (
-          <Fact title={`${bestBeforeTitle(trial, trials)}, flight ${bestBefore.number}`}>
-            {withUnit(bestBefore.error, unit)}{" "}
-            {!asked && !isCompared && !group?.trial_numbers.includes(bestBefore.number) && (
-              <Change error={trial.error} other={bestBefore.error} unit={unit} />
-            )}
-          </Fact>
+          <LabelledValue
+            title={`${bestBeforeTitle(trial, trials)}, flight ${bestBefore.number}`}
+            value={
+              <>
+                {withUnit(bestBefore.error, unit)}{" "}
+                {!asked && !isCompared && !group?.trial_numbers.includes(bestBefore.number) && (
+                  <Change error={trial.error} other={bestBefore.error} unit={unit} />
+                )}
+              </>
+            }
+          />
         )}
         {group !== undefined && group.errors.length > 1 && (
-          <Fact title={`Mean of ${flightsText(group.trial_numbers)}`} topic="standardError">
-            {plusMinus(group.mean, group.standard_error, unit)}{" "}
-            {group.standard_error !== null && <small>(± standard error)</small>}
-          </Fact>
+          <LabelledValue
+            title={`Mean of ${flightsText(group.trial_numbers)}`}
+            topic="standardError"
+            value={
+              <>
+                {plusMinus(group.mean, group.standard_error, unit)}{" "}
+                {group.standard_error !== null && <small>(± standard error)</small>}
+              </>
+            }
+          />
         )}
         {hasStepResponse(trial) &&
           MEASURES.map((measure) => (
-            <Fact key={measure.name} title={measure.title} topic={measure.topic}>
-              {measureText(trial, measure)}
-            </Fact>
+            <LabelledValue key={measure.name} {...measure} value={measureText(trial, measure)} />
           ))}
-        <Fact title="Gains" wide>
-          <span className={classes["gains"]}>
-            <GainList gains={trial.gains} experiment={experiment} />
-          </span>
-        </Fact>
+        <LabelledValue title="Gains" value={<GainList gains={trial.gains} experiment={experiment} />} />
       </dl>
       <Glitches trial={trial} unit={unit} />
       {without && (
-        <Text fz="body" lh={1.45} mb={4} role="status">
+        <Text fz="body" mb={4} role="status">
           {without}
         </Text>
       )}
@@ -181,7 +175,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         >
           Compare
         </Anchor>
-        {!own && (
+        {pin === undefined && (
           <Anchor component={Link} to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`} px={6} py={12}>
             Open flight
           </Anchor>
@@ -193,11 +187,11 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
   );
 }
 
-const ICONS = {
-  better: IconCircleArrowDown,
-  worse: IconCircleArrowUp,
-  unresolved: IconHelpHexagon,
-  "not known yet": IconHelpHexagon,
+const SIGNS = {
+  better: { Icon: IconCircleArrowDown, color: "var(--best)" },
+  worse: { Icon: IconCircleArrowUp, color: "var(--bad)" },
+  unresolved: { Icon: IconHelpHexagon, color: "var(--dim)" },
+  "not known yet": { Icon: IconHelpHexagon, color: "var(--dim)" },
 } as const;
 
 /** Verdicts of the flight's gains against the best before it and against the first. */
@@ -205,12 +199,12 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
   if (trial.comparisons.length === 0) return null;
   const asked = repeatPurpose(trial) !== "";
   return (
-    <ul className={classes["comparisons"]}>
+    <Stack component="ul" gap={4} mt={8} fz="body" lh={1.4} className="numbers">
       {trial.comparisons.map(({ against, trial_number, verdict, confidence, difference, standard_error }) => {
-        const Icon = ICONS[verdict];
+        const { Icon, color } = SIGNS[verdict];
         return (
-          <li key={against} data-verdict={asked ? undefined : verdict} className="numbers">
-            <Icon size={20} aria-hidden />
+          <Group key={against} component="li" gap={8} wrap="nowrap" align="start">
+            <Icon size={20} color={asked ? "var(--dim)" : color} aria-hidden />
             <span>
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>} vs.
               flight {trial_number} ({against === "first" ? "first" : best})
@@ -219,10 +213,10 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
               {difference < 0 ? "lower" : "higher"}{" "}
               <small>{standard_error === null ? "(no repeat flights yet)" : "(means, ± standard error)"}</small>
             </span>
-          </li>
+          </Group>
         );
       })}
-    </ul>
+    </Stack>
   );
 }
 
@@ -266,17 +260,17 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
 /** Retry of the gains of an aborted or invalid flight: flown at once on a simulation, otherwise staged. */
 function RetryGains({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
   const create = useCreateTrial(campaign);
-  const [speed] = useSpeed();
+  const speed = useSpeed();
   const { can_fly, needs_staging } = campaign.vehicle;
   if (!campaign.actions.includes("plan") || !can_fly || !["aborted", "invalid"].includes(trial.state)) return null;
-  const order = needs_staging ? {} : { fly: { speed: speedOf(speed) } };
+  const order = needs_staging ? {} : { fly: { speed } };
   return (
     <>
       <Button
         variant="default"
         leftSection={<IconRepeat size={18} aria-hidden />}
         loading={create.isPending}
-        onClick={() => watched(create.mutateAsync({ gains: trial.gains, ...order }))}
+        onClick={() => scrollUpOnceBegun(create.mutateAsync({ gains: trial.gains, ...order }))}
       >
         Fly these gains again
       </Button>

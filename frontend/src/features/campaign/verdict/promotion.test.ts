@@ -1,13 +1,13 @@
 import { expect, test } from "vitest";
-import { heldGainsNotice, promotable } from "./promotion";
+import { heldGainsNotice, promotionRefusal } from "./promotion";
 
 test("the best gains become the safe ones only once flights have shown that they are better", () => {
   const drone = { name: "Number 1", safe_gains: { kp: 283 } };
   const winner = { gains: { kp: 400 }, trial_numbers: [2, 3], verdict: "better" as const };
-  expect(promotable(winner, drone)).toEqual({ possible: true, why: "" });
-  expect(promotable({ ...winner, verdict: "unresolved" }, drone).why).toContain("their verdict is “unresolved”");
-  expect(promotable({ ...winner, verdict: null }, drone).possible).toBe(false);
-  expect(promotable({ ...winner, gains: { kp: 283 } }, drone).why).toBe(
+  expect(promotionRefusal(winner, drone)).toBe("");
+  expect(promotionRefusal({ ...winner, verdict: "unresolved" }, drone)).toContain("their verdict is “unresolved”");
+  expect(promotionRefusal({ ...winner, verdict: null }, drone)).toContain("fly others first");
+  expect(promotionRefusal({ ...winner, gains: { kp: 283 } }, drone)).toBe(
     "The best gains are the safe gains of Number 1.",
   );
 });

@@ -3,24 +3,17 @@
 import type { Campaign, Vehicle } from "../../../api/types";
 import { gainsInBrackets, inOrder, safeGainsWritten, sameHeld } from "../../../ui/gains";
 
-/** Whether the best gains may become the vehicle's safe gains; if not, the reason and the action. */
-export function promotable(
-  winner: Campaign["winner"],
+/** Why the best gains may not become the vehicle's safe gains, and what to do; empty if they may. */
+export function promotionRefusal(
+  { gains, verdict }: NonNullable<Campaign["winner"]>,
   { name, safe_gains: safe }: Pick<Vehicle, "name" | "safe_gains">,
-): { possible: boolean; why: string } {
-  if (winner !== null && sameHeld(safe, winner.gains))
-    return { possible: false, why: `The best gains are the safe gains of ${name}.` };
-  const verdict = winner?.verdict ?? null;
-  if (verdict === "better") return { possible: true, why: "" };
-  if (verdict === null)
-    return {
-      possible: false,
-      why: "The best gains so far are the first flight's. Only gains that are shown to be better than these can become the safe gains: fly others first.",
-    };
-  return {
-    possible: false,
-    why: `The best gains cannot become the safe gains of ${name}: their verdict is “${verdict}”. Fly the best and the first gains again until the verdict is “better”.`,
-  };
+): string {
+  if (sameHeld(safe, gains)) return `The best gains are the safe gains of ${name}.`;
+  if (verdict === "better") return "";
+  if (verdict === null) {
+    return "The best gains so far are the first flight's. Only gains that are shown to be better than these can become the safe gains: fly others first.";
+  }
+  return `The best gains cannot become the safe gains of ${name}: their verdict is “${verdict}”. Fly the best and the first gains again until the verdict is “better”.`;
 }
 
 /** After a change of the safe gains: the gains on the vehicle until the new ones are written; empty if they are written

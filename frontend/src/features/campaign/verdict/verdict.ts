@@ -23,18 +23,14 @@ const ASKED: Partial<Record<Trial["kind"], string>> = {
   repeat: "Repeat flight: flies earlier gains again to measure the scatter.",
 };
 
-const KEPT = {
-  inside: "The error is inside its predicted interval: no change detected.",
-  above: "The error is above its predicted interval: check the vehicle.",
-  below: "The error is below its predicted interval: check the vehicle.",
-} as const;
-
 /** Purpose of a flight that repeats gains, and its result against its prediction; empty for other flights. */
 export function repeatPurpose(trial: Trial): string {
   const why = ASKED[trial.kind];
   if (why === undefined || trial.state !== "valid") return "";
-  const kept = predictionResult(trial);
-  return kept === null ? why : `${why} ${KEPT[kept]}`;
+  const result = predictionResult(trial);
+  if (result === null) return why;
+  const reading = result === "inside" ? "no change detected" : "check the vehicle";
+  return `${why} The error is ${result} its predicted interval: ${reading}.`;
 }
 
 /** Markers of a flight besides its class. */
@@ -49,10 +45,7 @@ export function marksOf(trial: Trial): string[] {
 /** The valid flight with the lowest error before this one. */
 export function bestBeforeOf(trial: Pick<Trial, "number">, trials: readonly Trial[]): Trial | null {
   const before = trials.filter((one) => one.state === "valid" && one.number < trial.number && one.error !== null);
-  return before.reduce<Trial | null>(
-    (best, one) => (best === null || (one.error ?? 0) < (best.error ?? 0) ? one : best),
-    null,
-  );
+  return before.sort((one, other) => (one.error ?? 0) - (other.error ?? 0))[0] ?? null;
 }
 
 /** What the best flight before this one is by now: still the best, or only then. */
