@@ -1,7 +1,7 @@
 /** Prediction and gate result of gains that are considered for the next flight. */
 
 import { useDebouncedValue } from "@mantine/hooks";
-import { keepPreviousData, useQuery } from "@tanstack/react-query";
+import { hashKey, keepPreviousData, useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { answer } from "./client";
 import { evaluateGate, predictGains } from "./generated";
@@ -9,9 +9,8 @@ import type { GainsPrediction, Gate } from "./types";
 
 export type GainSet = Readonly<Record<string, number>>;
 
-function sameGains(one: GainSet, other: GainSet): boolean {
-  const names = Object.keys(one);
-  return names.length === Object.keys(other).length && names.every((name) => one[name] === other[name]);
+function areSame(one: GainSet | null, other: GainSet | null): boolean {
+  return hashKey([one]) === hashKey([other]);
 }
 
 interface Evaluated<Result> {
@@ -37,7 +36,7 @@ function useEvaluated<Result>(
     gcTime: KEPT_MS,
     retry: false,
   });
-  const isAsked = asked === gains || (asked !== null && gains !== null && sameGains(asked, gains));
+  const isAsked = areSame(asked, gains);
   if (!isAsked && !isFetching) setAsked(gains);
   return {
     result: data ?? null,
@@ -81,6 +80,6 @@ export function useEvaluation(campaignId: number, proposalId: number, gains: Gai
   const gate = useEvaluated(["gate", campaignId, proposalId], rested, (some) =>
     answer(evaluateGate({ path, body: { gains: some } })),
   );
-  const isAtRest = rested === gains || (rested !== null && gains !== null && sameGains(rested, gains));
+  const isAtRest = areSame(rested, gains);
   return { prediction, gate: { ...gate, isCurrent: gate.isCurrent && isAtRest } };
 }

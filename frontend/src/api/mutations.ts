@@ -1,6 +1,6 @@
 /** All mutations. The event stream invalidates queries; responses are stored in the cache immediately. */
 
-import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { type MutationFunctionContext, useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
 import { answer } from "./client";
 import {
@@ -29,65 +29,69 @@ import {
 } from "./generated";
 import { controlHeader } from "./leases";
 import type { RecordFiles } from "./records";
+import { useVehicleChanged } from "./vehicles";
 
-function useSettled() {
+/** Store a campaign that the server answered with. */
+function keepCampaign(campaign: Campaign, _sent: unknown, _before: unknown, { client }: MutationFunctionContext): void {
+  client.setQueryData(["campaign", campaign.id], campaign);
+  void client.invalidateQueries({ queryKey: ["campaigns"] });
+}
+
+/** Store a trial that the server answered with; everything else of its campaign follows from it. */
+function keepTrial(
+  trial: Trial,
+  _sent: unknown,
+  _before: unknown,
+  { client }: MutationFunctionContext,
+): Promise<unknown> {
+  client.setQueryData(["trial", trial.id], trial);
+  return Promise.all([
+    client.invalidateQueries({ queryKey: ["campaign", trial.campaign_id] }),
+    client.invalidateQueries({ queryKey: ["flying"] }),
+  ]);
+}
+
+/** Has all that is shown of campaigns read again. */
+function useStaleCampaigns() {
   const queries = useQueryClient();
-  return {
-    campaign: (campaign: Campaign): void => {
-      queries.setQueryData(["campaign", campaign.id], campaign);
-      void queries.invalidateQueries({ queryKey: ["campaigns"] });
-    },
-    ofCampaign: (campaignId: number): Promise<void> =>
-      queries.invalidateQueries({ queryKey: ["campaign", campaignId] }),
-    trial: (trial: Trial): Promise<unknown> => {
-      queries.setQueryData(["trial", trial.id], trial);
-      return Promise.all([
-        queries.invalidateQueries({ queryKey: ["campaign", trial.campaign_id] }),
-        queries.invalidateQueries({ queryKey: ["flying"] }),
-      ]);
-    },
-  };
+  return () => queries.invalidateQueries({ queryKey: ["campaign"] });
 }
 
 export function useCreateCampaign() {
-  const settled = useSettled();
   return useMutation({
     mutationFn: (body: NewCampaignInput) => answer(createCampaign({ body })),
-    onSuccess: settled.campaign,
+    onSuccess: keepCampaign,
   });
 }
 
 /** Plan a trial of a proposal or of manual gains, and fly it if the body requests it; otherwise open the fly screen of
  * a registered vehicle. Navigates here because the calling card is unmounted as soon as the trial is known. */
 export function useCreateTrial({ id, vehicle }: Campaign) {
-  const settled = useSettled();
   const navigate = useNavigate();
   return useMutation({
     mutationFn: (body: NewTrial) =>
       answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
-    onSuccess: (trial, { fly }) => {
-      if (vehicle.registered && !fly) void navigate(`/fly/${trial.id}`);
-      return settled.trial(trial);
+    onSuccess: (trial, sent, before, context) => {
+      if (vehicle.registered && !sent.fly) void navigate(`/fly/${trial.id}`);
+      return keepTrial(trial, sent, before, context);
     },
-    onError: () => settled.ofCampaign(id),
+    onError: useStaleCampaigns(),
   });
 }
 
-export function useFlyTrial({ id, vehicle }: Campaign) {
-  const settled = useSettled();
+export function useFlyTrial({ vehicle }: Campaign) {
   return useMutation({
     mutationFn: ({ trialId, speed }: { trialId: number; speed: number | null }) =>
       answer(flyTrial({ path: { trial_id: trialId }, body: { speed }, headers: controlHeader(vehicle.id) })),
-    onSuccess: settled.trial,
-    onError: () => settled.ofCampaign(id),
+    onSuccess: keepTrial,
+    onError: useStaleCampaigns(),
   });
 }
 
 export function useCancelTrial() {
-  const settled = useSettled();
   return useMutation({
     mutationFn: (trialId: number) => answer(cancelTrial({ path: { trial_id: trialId } })),
-    onSuccess: settled.trial,
+    onSuccess: keepTrial,
   });
 }
 
@@ -98,12 +102,11 @@ export interface ClassificationInput {
 }
 
 export function useClassify() {
-  const settled = useSettled();
   return useMutation({
     mutationFn: ({ trial, outcome, reason }: ClassificationInput) =>
       answer(classifyTrial({ path: { trial_id: trial.id }, body: { version: trial.version, outcome, reason } })),
-    onSuccess: settled.trial,
-    onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),
+    onSuccess: keepTrial,
+    onError: useStaleCampaigns(),
   });
 }
 
@@ -111,12 +114,11 @@ export type AbortJudgementInput = "behaved badly" | "something else";
 
 /** Why the operator aborted a flight. */
 export function useJudgeAbort() {
-  const settled = useSettled();
   return useMutation({
     mutationFn: ({ trial, cause }: { trial: Trial; cause: AbortJudgementInput }) =>
       answer(judgeAbort({ path: { trial_id: trial.id }, body: { version: trial.version, cause } })),
-    onSuccess: settled.trial,
-    onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),
+    onSuccess: keepTrial,
+    onError: useStaleCampaigns(),
   });
 }
 
@@ -133,7 +135,6 @@ export interface RecordOrder extends RecordFiles {
 
 /** Upload the record of a flight made elsewhere: of a planned trial, or with the trial to plan. */
 export function useUploadRecord(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: ({ file, companion, trialId, plan, ...query }: RecordOrder) => {
       const files = { file, ...(companion === undefined ? {} : { companion }) };
@@ -147,79 +148,69 @@ export function useUploadRecord(campaignId: number) {
           : uploadTrajectory({ path: { trial_id: trialId }, query, body: files }),
       );
     },
-    onSuccess: settled.trial,
-    onError: () => settled.ofCampaign(campaignId),
+    onSuccess: keepTrial,
+    onError: useStaleCampaigns(),
   });
 }
 
 export type RecordUpload = ReturnType<typeof useUploadRecord>;
 
 export function useRecompute(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: () => answer(computeProposal({ path: { campaign_id: campaignId } })),
-    onSuccess: () => settled.ofCampaign(campaignId),
+    onSuccess: useStaleCampaigns(),
   });
 }
 
 export function useFinish(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: () => answer(finishCampaign({ path: { campaign_id: campaignId }, body: {} })),
-    onSuccess: settled.campaign,
+    onSuccess: keepCampaign,
   });
 }
 
 /** Delete a campaign that has not flown. */
 export function useDeleteCampaign({ id, version }: Campaign, onDeleted: () => void) {
-  const queries = useQueryClient();
   return useMutation({
     mutationFn: () => answer(deleteCampaign({ path: { campaign_id: id }, query: { version } })),
-    onSuccess: () => {
+    onSuccess: (_none, _sent, _before, { client }) => {
       onDeleted();
-      void queries.invalidateQueries({ queryKey: ["campaigns"] });
+      void client.invalidateQueries({ queryKey: ["campaigns"] });
     },
   });
 }
 
 /** Create the campaign that rehearses this one on a simulation. */
 export function useRehearse(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: () => answer(rehearseCampaign({ path: { campaign_id: campaignId } })),
-    onSuccess: settled.campaign,
-    onSettled: () => settled.ofCampaign(campaignId),
+    onSuccess: keepCampaign,
+    onSettled: useStaleCampaigns(),
   });
 }
 
 /** Set the best gains as the safe gains of the campaign's registered vehicle. */
 export function usePromote({ id, vehicle }: Campaign) {
-  const queries = useQueryClient();
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: (body: { version: number; statement: string }) =>
       answer(promoteBest({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
-    onSettled: () =>
-      Promise.all([
-        queries.invalidateQueries({ queryKey: ["vehicles"] }),
-        queries.invalidateQueries({ queryKey: ["vehicle", vehicle.id] }),
-      ]),
+    onSettled: () => changed(vehicle.id),
   });
 }
 
 /** Continue a finished campaign for some flights, of which `plan` lists those that are planned at once, in order. */
 export function useReopen(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: (body: Reopening) => answer(reopenCampaign({ path: { campaign_id: campaignId }, body })),
-    onSettled: () => settled.ofCampaign(campaignId),
+    onSettled: useStaleCampaigns(),
   });
 }
 
 export function useArchive(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: () => answer(archiveCampaign({ path: { campaign_id: campaignId } })),
-    onSuccess: settled.campaign,
+    onSuccess: keepCampaign,
   });
 }
 
@@ -230,7 +221,6 @@ export interface Cloning {
 }
 
 export function useClone(campaignId: number) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: ({ vehicle, warmStart }: Cloning) =>
       answer(
@@ -239,16 +229,15 @@ export function useClone(campaignId: number) {
           body: { warm_start: warmStart, ...(vehicle === undefined ? {} : { vehicle }) },
         }),
       ),
-    onSuccess: settled.campaign,
+    onSuccess: keepCampaign,
   });
 }
 
 export function useRename(campaign: Campaign) {
-  const settled = useSettled();
   return useMutation({
     mutationFn: (name: string) =>
       answer(editCampaign({ path: { campaign_id: campaign.id }, body: { version: campaign.version, name } })),
-    onSuccess: settled.campaign,
-    onError: () => settled.ofCampaign(campaign.id),
+    onSuccess: keepCampaign,
+    onError: useStaleCampaigns(),
   });
 }

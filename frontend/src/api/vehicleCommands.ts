@@ -1,6 +1,6 @@
 /** Actions of the fly screen: stage, take off, unstage; land and motors off, which bypass the queue. */
 
-import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useMutation } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { answer } from "./client";
 import { landVehicle, stageTrial, stopMotors, type Trial, takeOffTrial, unstageTrial } from "./generated";
@@ -10,18 +10,13 @@ import { problemOf } from "./problems";
 type Act = typeof stageTrial | typeof takeOffTrial | typeof unstageTrial;
 
 function useAct(act: Act, vehicleId: number) {
-  const queries = useQueryClient();
-  const settled = (trialId: number, campaignId: number) =>
-    Promise.all([
-      queries.invalidateQueries({ queryKey: ["trial", trialId] }),
-      queries.invalidateQueries({ queryKey: ["campaign", campaignId] }),
-      queries.invalidateQueries({ queryKey: ["vehicles"] }),
-      queries.invalidateQueries({ queryKey: ["flying"] }),
-    ]);
   return useMutation({
     mutationFn: ({ id }: Trial) => answer(act({ path: { trial_id: id }, headers: controlHeader(vehicleId) })),
-    onSuccess: (after) => queries.setQueryData(["trial", after.id], after),
-    onSettled: (_after, _error, { id, campaign_id }) => settled(id, campaign_id),
+    onSuccess: (after, _trial, _before, { client }) => client.setQueryData(["trial", after.id], after),
+    onSettled: (_after, _error, { id, campaign_id }, _before, { client }) => {
+      const stale = [["trial", id], ["campaign", campaign_id], ["vehicles"], ["flying"]];
+      return Promise.all(stale.map((queryKey) => client.invalidateQueries({ queryKey })));
+    },
   });
 }
 

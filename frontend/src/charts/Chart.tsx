@@ -1,3 +1,4 @@
+import { Box, Text } from "@mantine/core";
 import type { Plotly } from "plotly.js-basic-dist-min";
 import { useEffect, useLayoutEffect, useRef, useState } from "react";
 import type { TimeRange } from "../api/queries";
@@ -18,13 +19,13 @@ import {
 } from "./plotly";
 import { type DrawnPrediction, narrowed, type PlotlyFigure, traceWithRole, withLive, withPrediction } from "./traces";
 
-interface Props {
+export interface ChartProps {
   figure: PlotlyFigure;
   /** Text alternative for screen readers; the data table has the details. */
   label: string;
   /** In pixels; null fills the container. */
   height: number | null;
-  liveTrial?: number | null;
+  liveTrial?: number | null | undefined;
   onChoose?: ((trial: number) => void) | undefined;
   /** Called with the x value that is clicked. */
   onPlace?: ((x: number) => void) | undefined;
@@ -66,14 +67,14 @@ export function Chart({
   curveOf,
   prediction,
   build,
-}: Props) {
+}: ChartProps) {
   const element = useRef<HTMLDivElement & PlotlyElement>(null);
   const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
   const [enqueue] = useState(() =>
     createDrawings((error) => setBroken(error instanceof Error ? error.message : String(error))),
   );
-  const drawn = useRef<{ figure: PlotlyFigure; prediction: Props["prediction"] } | null>(null);
+  const drawn = useRef<{ figure: PlotlyFigure; prediction: ChartProps["prediction"] } | null>(null);
   const latestPrediction = useRef(prediction);
   latestPrediction.current = prediction;
 
@@ -152,18 +153,19 @@ export function Chart({
   }, [plotly]);
 
   return (
-    // biome-ignore lint/a11y/useSemanticElements: a fieldset is for forms; this groups a drawing's parts under one name
-    <div
+    <Box
       role="group"
       aria-label={label}
-      className={classes["frame"]}
+      pos="relative"
       style={{ height: height === null ? "100%" : `min(${height}px, var(--tallest, 96vw))` }}
     >
       {broken !== null && (
-        <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table is still available.</p>
+        <Text p={24} c="var(--bad)">
+          The chart could not be drawn ({broken}). Its data table is still available.
+        </Text>
       )}
       {plotly === null && broken === null && <div className={classes["waiting"]} aria-hidden />}
       <div ref={element} className={classes["plot"]} data-drawn={plotly !== null || undefined} />
-    </div>
+    </Box>
   );
 }

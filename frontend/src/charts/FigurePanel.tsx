@@ -1,7 +1,6 @@
 import { ActionIcon } from "@mantine/core";
 import { IconChartLine, IconTable } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
-import type { TimeRange } from "../api/queries";
 import type { FigureCard } from "../api/types";
 import { DataTable } from "../ui/DataTable";
 import type { Topic } from "../ui/explanations";
@@ -10,11 +9,10 @@ import { Note } from "../ui/Note";
 import { ErrorNotice } from "../ui/Notices";
 import { Panel } from "../ui/Panel";
 import classes from "../ui/Panel.module.css";
-import { Chart } from "./Chart";
-import type { Build, CurveOf } from "./plotly";
-import type { DrawnPrediction, PlotlyFigure } from "./traces";
+import { Chart, type ChartProps } from "./Chart";
+import type { PlotlyFigure } from "./traces";
 
-interface Props {
+interface Props extends Omit<ChartProps, "figure" | "label"> {
   title: string;
   card: FigureCard | undefined;
   error: unknown;
@@ -23,14 +21,6 @@ interface Props {
   height: number;
   /** Modifies the received figure. */
   dressed?: (figure: PlotlyFigure) => PlotlyFigure;
-  liveTrial?: number | null;
-  onChoose?: (trial: number) => void;
-  onPlace?: ((x: number) => void) | undefined;
-  onWindow?: (window: TimeRange | null) => void;
-  onReset?: () => void;
-  curveOf?: CurveOf;
-  prediction?: DrawnPrediction | null;
-  build?: Build;
   tools?: ReactNode;
   /** Help topic. */
   topic?: Topic;
@@ -47,26 +37,15 @@ export function FigurePanel({
   wanted = true,
   height,
   dressed,
-  liveTrial,
-  onChoose,
-  onPlace,
-  onWindow,
-  onReset,
-  curveOf,
-  prediction,
-  build,
   tools,
   topic,
   note,
   className,
+  ...chart
 }: Props) {
   const [asTable, setAsTable] = useState(false);
-  const raw = card?.figure;
-  const figure = useMemo(() => {
-    if (!raw) return null;
-    const drawn = raw as unknown as PlotlyFigure;
-    return dressed === undefined ? drawn : dressed(drawn);
-  }, [raw, dressed]);
+  const raw = card?.figure as PlotlyFigure | null | undefined;
+  const figure = useMemo(() => (raw && dressed ? dressed(raw) : (raw ?? null)), [raw, dressed]);
   const Icon = asTable ? IconChartLine : IconTable;
   const other = asTable ? `${title}: show the chart` : `${title}: show the numbers as a table`;
   return (
@@ -99,19 +78,7 @@ export function FigurePanel({
         <DataTable table={card.table} label={`${title}, numbers`} height={height} />
       )}
       {figure !== null && !asTable && (
-        <Chart
-          figure={figure}
-          label={`${title}. ${card?.summary ?? ""}`}
-          height={height}
-          liveTrial={liveTrial ?? null}
-          onChoose={onChoose}
-          onPlace={onPlace}
-          onWindow={onWindow}
-          onReset={onReset}
-          curveOf={curveOf}
-          prediction={prediction}
-          build={build}
-        />
+        <Chart {...chart} figure={figure} label={`${title}. ${card?.summary ?? ""}`} height={height} />
       )}
       {note && <Note mt={10}>{note}</Note>}
     </Panel>

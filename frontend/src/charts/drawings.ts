@@ -17,6 +17,16 @@ export function createDrawings(onError: (error: unknown) => void): Enqueue {
   };
 }
 
+interface Curve {
+  x: unknown[];
+  y: unknown[];
+}
+
+/** Of curves one after the other, what Plotly wants: all of one kind. */
+export function columnsOf(curves: readonly Curve[]) {
+  return { x: curves.map(({ x }) => x), y: curves.map(({ y }) => y) };
+}
+
 const AT_ONCE = { mode: "immediate", frame: { duration: 0, redraw: false }, transition: { duration: 0 } } as const;
 
 /**
@@ -26,7 +36,7 @@ const AT_ONCE = { mode: "immediate", frame: { duration: 0, redraw: false }, tran
 export async function moveCurves(
   plotly: Pick<Plotly, "animate" | "update">,
   chart: HTMLElement,
-  curves: readonly { x: unknown; y: unknown }[],
+  curves: readonly Curve[],
   places: number[],
 ): Promise<void> {
   const data = curves.map(({ x, y }) => ({ x, y }));
@@ -37,5 +47,5 @@ export async function moveCurves(
   const paint = new Promise<boolean>((done) => setTimeout(() => done(false), LONGEST_PAINT_MS));
   if (await Promise.race([moving, paint])) return;
   await plotly.animate(chart, [], AT_ONCE); // drops what still waits for a paint
-  await plotly.update(chart, { x: data.map(({ x }) => x), y: data.map(({ y }) => y) }, {}, places);
+  await plotly.update(chart, columnsOf(curves), {}, places);
 }

@@ -5,7 +5,7 @@ import type { TimeRange } from "../api/queries";
 import { onLive } from "../live/store";
 import type { LiveFlight } from "../live/telemetry";
 import { throttled } from "../ui/throttle";
-import { type Enqueue, moveCurves } from "./drawings";
+import { columnsOf, type Enqueue, moveCurves } from "./drawings";
 import { onPointed, pointAt } from "./pointing";
 import {
   type DrawnPrediction,
@@ -181,7 +181,7 @@ export async function drawPrediction(
   const [places, curves] = [[...drawn.keys()], [...drawn.values()]];
   const onlyMoves = curves.every(({ x }, index) => x.length > 0 && chart.data?.[places[index] as number]?.x?.length);
   if (onlyMoves) await moveCurves(plotly, chart, curves, places);
-  else await plotly.update(chart, { x: curves.map(({ x }) => x), y: curves.map(({ y }) => y) }, {}, places);
+  else await plotly.update(chart, columnsOf(curves), {}, places);
 }
 
 /**
@@ -207,11 +207,7 @@ export function drawLive(
       await moveCurves(plotly, chart, curves, places);
       return;
     }
-    const change = {
-      x: curves.map(({ x }) => x),
-      y: curves.map(({ y }) => y),
-      showlegend: curves.map(({ showlegend }) => showlegend),
-    };
+    const change = { ...columnsOf(curves), showlegend: curves.map(({ showlegend }) => showlegend) };
     await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, places);
     isBegun = curves.every((curve) => curve.x.length > 0);
   };

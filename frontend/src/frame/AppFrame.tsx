@@ -1,5 +1,7 @@
+import { Box, Stack } from "@mantine/core";
+import { useWindowEvent } from "@mantine/hooks";
 import { useQueryClient } from "@tanstack/react-query";
-import { Suspense, useEffect, useLayoutEffect, useRef } from "react";
+import { Suspense, useEffect, useEffectEvent, useLayoutEffect, useRef } from "react";
 import { Link, Outlet, useLocation, useMatch, useNavigationType, useSearchParams } from "react-router";
 import { useReadOnlyReason, useUnlocked } from "../api/access";
 import { useRenewedControl } from "../api/control";
@@ -27,32 +29,22 @@ function useSpaceAborts(
   campaignId: number | null,
   press: (trialIds: readonly number[]) => void,
 ): void {
-  const latest = useRef({ listed, campaignId, press });
-  latest.current = { listed, campaignId, press };
-  useEffect(() => {
-    function onKey(event: KeyboardEvent): void {
-      const { listed, campaignId, press } = latest.current;
-      const targets = abortTargets([...listed, ...liveFlightsNow()], campaignId);
-      if (event.code !== "Space" || targets.length === 0) return;
-      event.preventDefault();
-      event.stopPropagation();
-      if (!event.repeat && event.type === "keydown") press([...new Set(targets.map(({ trialId }) => trialId))]);
-    }
-    // Buttons act on keyup, so it is suppressed too.
-    document.addEventListener("keydown", onKey, { capture: true });
-    document.addEventListener("keyup", onKey, { capture: true });
-    return () => {
-      document.removeEventListener("keydown", onKey, { capture: true });
-      document.removeEventListener("keyup", onKey, { capture: true });
-    };
-  }, []);
+  function onKey(event: KeyboardEvent): void {
+    const targets = abortTargets([...listed, ...liveFlightsNow()], campaignId);
+    if (event.code !== "Space" || targets.length === 0) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!event.repeat && event.type === "keydown") press([...new Set(targets.map(({ trialId }) => trialId))]);
+  }
+  useWindowEvent("keydown", onKey, { capture: true });
+  // Buttons act on keyup, so it is suppressed too.
+  useWindowEvent("keyup", onKey, { capture: true });
 }
 
 function useEventStream(flying: boolean): void {
   const queries = useQueryClient();
-  const flies = useRef(flying);
-  flies.current = flying;
-  useEffect(() => followEvents(queries, () => flies.current), [queries]);
+  const somethingFlies = useEffectEvent(() => flying);
+  useEffect(() => followEvents(queries, () => somethingFlies()), [queries]);
 }
 
 /** Vehicle of the campaign that is open, while it does not fly: then its name is beside its readings. */
@@ -83,7 +75,8 @@ export function AppFrame() {
   const abort = useAbort(flying);
   const { pathname } = useLocation();
   const onFlyScreen = useMatch("/fly/:trialId") !== null;
-  useEventStream(flying.length > 0);
+  const isInFlight = flying.length > 0;
+  useEventStream(isInFlight);
   useRenewedControl();
   usePagesOpenAtTop();
   const { state } = useConnection();
@@ -93,34 +86,35 @@ export function AppFrame() {
   useSpaceAborts(flying, campaignId, abort.press);
   const isOwnInAir = flying.some((one) => one.campaignId === campaignId);
   return (
-    <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
-      <a href="#main" className={classes["skip"]}>
+    <div className={onFlyScreen ? classes["whole"] : undefined}>
+      <a href="#main" className={`${classes["skip"]} visually-hidden`}>
         Skip to content
       </a>
       <header className={classes["header"]}>
-        <div className={classes["bar"]} data-flying={flying.length > 0 || undefined}>
+        <div className={classes["bar"]}>
           <Link to="/" className={classes["home"]} aria-label="Gainline, all campaigns">
             <img src="/icon.svg" alt="" width={32} height={32} />
-            <span className={classes["homeName"]}>Gainline</span>
+            <Box component="span" visibleFrom="xs">
+              Gainline
+            </Box>
           </Link>
-          <MainNav />
-          <div className={classes["vehicle"]}>
+          <MainNav isInFlight={isInFlight} />
+          <Box className={classes["vehicle"]} visibleFrom={isInFlight ? "xs" : undefined}>
             {campaignId !== null && Number.isInteger(campaignId) && !isOwnInAir && (
               <CampaignVehicle campaignId={campaignId} />
             )}
-          </div>
-          <div className={classes["spacer"]} />
-          <div className={classes["flights"]}>
+          </Box>
+          <Stack gap={6} className={classes["flights"] ?? ""}>
             {flying.map((one) => (
               <FlyingBar key={one.trialId} flying={one} abort={abort} />
             ))}
-          </div>
+          </Stack>
           <ConnectionState />
           <ThemeSwitch />
           <KeyboardHelp />
         </div>
         {abort.trouble !== null && (
-          <p className={classes["trouble"]} role="alert">
+          <p className={classes["notice"]} data-tone="bad" role="alert">
             <strong>The abort is not confirmed.</strong> {abort.trouble} It is sent again until the worker confirms it.
             If a vehicle is in the air, use its own remote control now.
           </p>

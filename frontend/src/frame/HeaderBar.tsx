@@ -1,14 +1,7 @@
-import { ActionIcon, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
-import {
-  IconMoon,
-  IconOctagonFilled,
-  IconPlugConnected,
-  IconPlugConnectedX,
-  IconRefresh,
-  IconSun,
-} from "@tabler/icons-react";
+import { ActionIcon, Box, Text, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
+import { IconMoon, IconPlugConnected, IconPlugConnectedX, IconRefresh, IconSun } from "@tabler/icons-react";
 import { Link } from "react-router";
-import { ABORT_LABELS, type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
+import { type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
 import {
   type Connection,
   liveNow,
@@ -18,7 +11,8 @@ import {
   useVehicleStatus,
 } from "../live/store";
 import { outputNow, readingOf } from "../live/telemetry";
-import { isAfterRecord, isDown } from "../live/vehicleStatus";
+import { isAfterRecord, isDown, oneOf } from "../live/vehicleStatus";
+import { AbortButton } from "../ui/AbortButton";
 import { VehicleBadge } from "../ui/Badges";
 import { withUnit } from "../ui/format";
 import { Time } from "../ui/Time";
@@ -36,7 +30,9 @@ export function ConnectionState() {
   return (
     <span className={classes["connection"]} data-bad={bad || undefined} title={text}>
       <Icon size={18} aria-hidden />
-      <span className={classes["connectionText"]}>{text}</span>
+      <Box component="span" visibleFrom={bad ? "xs" : undefined}>
+        {text}
+      </Box>
     </span>
   );
 }
@@ -46,7 +42,7 @@ export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[]
   const { state, worker, heardAt } = useConnection();
   if (state === "away") {
     return (
-      <p className={classes["notice"]} role="status">
+      <p className={classes["notice"]} data-tone="warn" role="status">
         <strong>The server is not responding.</strong>{" "}
         {heardAt === null ? "The data is out of date. " : ["Data as of ", <Time key="at" at={heardAt} seconds />, ". "]}
         The page updates automatically when the server is back.
@@ -55,7 +51,7 @@ export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[]
   }
   if (state === "live" && !worker) {
     return (
-      <p className={classes["notice"]} role="status">
+      <p className={classes["notice"]} data-tone="warn" role="status">
         <strong>The worker is not responding.</strong> {withoutWorker(flying)} The server restarts its own worker within
         seconds. If the worker runs separately, start it again with <code>gainline worker</code>.
       </p>
@@ -65,11 +61,11 @@ export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[]
 }
 
 /** Phases of a flight that has not left the ground. */
-const ON_GROUND: ReadonlySet<string> = new Set(["staging", "staged"]);
+const isOnGround = oneOf("staging", "staged");
 
 /** What the loss of the worker means, as the fly screen says it; a vehicle in the air is not paused. */
 function withoutWorker(flying: readonly FlyingCampaign[]): string {
-  const inTheAir = flying.filter(({ trialId }) => !ON_GROUND.has(liveNow(trialId)?.phase ?? ""));
+  const inTheAir = flying.filter(({ trialId }) => !isOnGround(liveNow(trialId)?.phase));
   if (inTheAir.some(({ hasLink }) => hasLink)) {
     return "If the worker has stopped, the vehicle is landing now; if only the connection to the worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.";
   }
@@ -88,13 +84,15 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
   const reading = readingOf(live?.channel ?? "");
   return (
     <section className={classes["flight"]} aria-label={`Flight in progress: ${flying.name}`}>
-      <span className={classes["flightVehicle"]}>
+      <Box className={classes["vehicle"]} maw={220} visibleFrom="xs">
         <VehicleBadge isReal={flying.isReal} title={flying.vehicleName} />
-      </span>
-      <span className={classes["flightName"]} title={flying.name}>
+      </Box>
+      <Text span truncate c="dimmed" fz="small" maw={320} visibleFrom="md" title={flying.name}>
         {flying.name} · flight {flying.trialNumber}
-      </span>
-      {isCurrent && <span className={classes["pulse"]} aria-hidden />}
+      </Text>
+      {isCurrent && (
+        <Box component="span" className={classes["pulse"]} visibleFrom="xs" data-reduce-motion aria-hidden />
+      )}
       <Link
         to={`/fly/${flying.trialId}`}
         className={`${classes["readings"]} numbers`}
@@ -102,22 +100,16 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
         title="Open fly screen"
       >
         {time === undefined ? (
-          <span>{live?.phase === "staging" || live?.phase === "staged" ? live.phase : "in flight"}</span>
+          <span>{isOnGround(live?.phase) ? live?.phase : "in flight"}</span>
         ) : (
           <>
-            <span className={classes["big"]}>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</span>
+            <span className={classes["output"]}>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</span>
             {!isAfter && <span>{withUnit(time, "s", 1)}</span>}
             {!isCurrent && <span>last known</span>}
           </>
         )}
       </Link>
-      {!isDown(status, time !== undefined) && (
-        <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
-          <IconOctagonFilled size={20} aria-hidden />
-          {ABORT_LABELS[stage]}
-          {stage === "none" && <kbd>Space</kbd>}
-        </button>
-      )}
+      {!isDown(status, time !== undefined) && <AbortButton trialId={flying.trialId} stage={stage} abort={abort} />}
     </section>
   );
 }

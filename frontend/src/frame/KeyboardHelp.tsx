@@ -1,6 +1,6 @@
 import { ActionIcon, Title } from "@mantine/core";
 import { IconKeyboard } from "@tabler/icons-react";
-import { useRef } from "react";
+import { Fragment, useRef } from "react";
 import { useLocation } from "react-router";
 import { Note } from "../ui/Note";
 import classes from "./KeyboardHelp.module.css";
@@ -23,7 +23,7 @@ export function KeyboardHelp() {
     <>
       <ActionIcon
         color="gray"
-        className={classes["ask"] ?? ""}
+        visibleFrom="xs"
         aria-label="Keyboard shortcuts"
         title="Keyboard shortcuts (?)"
         aria-haspopup="dialog"
@@ -45,14 +45,14 @@ export function KeyboardHelp() {
         </Title>
         <dl className={classes["keys"]}>
           {keysOf(pathname).map(({ keys, does }) => (
-            <div key={does}>
+            <Fragment key={does}>
               <dt>
                 {keys.map((key) => (
                   <kbd key={key}>{key}</kbd>
                 ))}
               </dt>
               <dd>{does}</dd>
-            </div>
+            </Fragment>
           ))}
         </dl>
         <Note mt={14} fz="small">

@@ -1,4 +1,4 @@
-import { UnstyledButton } from "@mantine/core";
+import { Box, Group, UnstyledButton } from "@mantine/core";
 import { IconChevronDown, IconMenu2 } from "@tabler/icons-react";
 import { useRef } from "react";
 import { NavLink, useLocation } from "react-router";
@@ -29,38 +29,44 @@ function PageLink({ to, title, onClick }: PageLinkProps) {
   );
 }
 
-/** Main navigation: the main pages in a row, the rest in a menu; all in the menu on small screens and in flight. */
-export function MainNav() {
+/** Main navigation: the main pages in a row, the rest in a menu; all in the menu on small screens, in flight also on
+ * larger ones. A phone has no room for it in flight. */
+export function MainNav({ isInFlight }: { isInFlight: boolean }) {
   const { pathname } = useLocation();
   const menu = useRef<HTMLUListElement>(null);
   const inMenu = PAGES.some(({ to, inRow }) => to === pathname && !inRow);
+  const rowFrom = isInFlight ? "lg" : "sm";
   return (
-    <nav aria-label="Pages" className={classes["nav"]}>
-      <ul className={classes["row"]}>
+    <Box component="nav" aria-label="Pages" className={classes["nav"]} visibleFrom={isInFlight ? "xs" : undefined}>
+      <Box component="ul" className={classes["row"]} visibleFrom={rowFrom}>
         {PAGES.filter(({ inRow }) => inRow).map((page) => (
           <li key={page.to}>
             <PageLink {...page} />
           </li>
         ))}
-      </ul>
+      </Box>
       <UnstyledButton
-        className={classes["more"] ?? ""}
+        className={classes["link"] ?? ""}
         data-here={inMenu || undefined}
         aria-label="More pages"
         title="More pages"
         popoverTarget="pages"
       >
-        <span className={classes["word"]}>More</span>
-        <IconChevronDown size={18} aria-hidden className={classes["word"]} />
-        <IconMenu2 size={22} aria-hidden className={classes["icon"]} />
+        <Group gap={4} visibleFrom={rowFrom}>
+          More
+          <IconChevronDown size={18} aria-hidden />
+        </Group>
+        <Box hiddenFrom={rowFrom} c="var(--ink)" lh={0}>
+          <IconMenu2 size={22} aria-hidden />
+        </Box>
       </UnstyledButton>
       <ul id="pages" popover="auto" ref={menu} className={classes["menu"]}>
         {PAGES.map((page) => (
-          <li key={page.to} data-in-row={page.inRow || undefined}>
+          <Box component="li" key={page.to} hiddenFrom={page.inRow ? rowFrom : undefined}>
             <PageLink {...page} onClick={() => menu.current?.hidePopover()} />
-          </li>
+          </Box>
         ))}
       </ul>
-    </nav>
+    </Box>
   );
 }

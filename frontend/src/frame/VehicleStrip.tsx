@@ -1,4 +1,6 @@
+import { Text } from "@mantine/core";
 import { IconAlertTriangle, IconAntennaBars5, IconAntennaBarsOff, IconBattery3, IconUser } from "@tabler/icons-react";
+import type { ReactNode } from "react";
 import { Link, useMatch } from "react-router";
 import { useOwnLease } from "../api/leases";
 import { useCampaign, useTrial } from "../api/queries";
@@ -11,7 +13,8 @@ import { withUnit } from "../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
 import classes from "./VehicleStrip.module.css";
 
-const ALWAYS_SHOWN: ReadonlySet<Vehicle["state"]> = new Set(["staged", "flying", "quarantined"]);
+const PACKET_AGE = "Time since the last packet from the vehicle";
+const ALWAYS_SHOWN: readonly Vehicle["state"][] = ["staged", "flying", "quarantined"];
 
 /** On every page: each connected vehicle with its link, battery, gains and operator. A fly screen needs its height: it
  * shows its own vehicle, and others only while something is up with them. */
@@ -21,7 +24,7 @@ export function VehicleStrip() {
     ({ registered, state }) => registered && state !== "disconnected",
   );
   return connected
-    .filter(({ id, state }) => own === null || id === own || ALWAYS_SHOWN.has(state))
+    .filter(({ id, state }) => own === null || id === own || ALWAYS_SHOWN.includes(state))
     .map((vehicle) => <VehicleLine key={vehicle.id} vehicle={vehicle} isBrief={own !== null && vehicle.id !== own} />);
 }
 
@@ -37,7 +40,6 @@ function VehicleLine({ vehicle, isBrief }: { vehicle: Vehicle; isBrief: boolean 
   const aged = useVehicleStatus(vehicle.id);
   const stale = aged === null || !aged.isCurrent;
   const low = lowBattery(vehicle, aged?.status.batteryV);
-  const LinkIcon = stale ? IconAntennaBarsOff : IconAntennaBars5;
   return (
     <section
       className={`${classes["line"]} numbers`}
@@ -58,26 +60,19 @@ function VehicleLine({ vehicle, isBrief }: { vehicle: Vehicle; isBrief: boolean 
           {aged.status.trouble}
         </span>
       )}
-      <span
-        className={classes["fact"]}
-        data-bad={stale || undefined}
-        title="Time since the last packet from the vehicle"
-      >
-        <LinkIcon size={17} aria-hidden />
-        <span className="visually-hidden">Link</span>
+      <Fact Icon={stale ? IconAntennaBarsOff : IconAntennaBars5} name="Link" title={PACKET_AGE} isBad={stale}>
         {linkText(aged)}
-      </span>
-      <span
-        className={classes["fact"]}
-        data-stale={stale || undefined}
-        data-bad={(low !== "" && !stale) || undefined}
+      </Fact>
+      <Fact
+        Icon={IconBattery3}
+        name="Battery"
         title={`Battery ${vehicle.battery}`}
+        isBad={low !== "" && !stale}
+        isStale={stale}
       >
-        <IconBattery3 size={18} aria-hidden />
-        <span className="visually-hidden">Battery</span>
         {withUnit(aged?.status.batteryV, "V", 1)}
         {low !== "" && `, ${low}`}
-      </span>
+      </Fact>
       <HeldGains vehicle={vehicle} held={heldGains(vehicle, aged)} stale={stale} />
       <InControl vehicle={vehicle} />
     </section>
@@ -90,27 +85,45 @@ interface HeldProps {
   stale: boolean;
 }
 
+interface FactProps {
+  Icon?: typeof IconUser;
+  /** What the icon says. */
+  name?: string;
+  title?: string;
+  isBad?: boolean;
+  isStale?: boolean;
+  children: ReactNode;
+}
+
+function Fact({ Icon, name, title, isBad = false, isStale = false, children }: FactProps) {
+  return (
+    <span
+      className={classes["fact"]}
+      data-tone={isBad ? "bad" : undefined}
+      data-stale={isStale || undefined}
+      title={title}
+    >
+      {Icon && <Icon size={17} aria-hidden />}
+      <span className="visually-hidden">{name}</span>
+      {children}
+    </span>
+  );
+}
+
 /** Current gains next to the safe gains: from the link, which may not know them; without one as last read back. */
 function HeldGains({ vehicle, held, stale }: HeldProps) {
   const { safe_gains: safe } = vehicle;
   const known = inOrder(held, Object.keys(safe));
-  const names = Object.keys(safe).join(", ");
-  if (Object.keys(known).length === 0) {
-    return (
-      <span className={classes["fact"]} data-stale>
-        <span>gains not read · safe {gainsInBrackets(safe)}</span>
-      </span>
-    );
-  }
+  if (Object.keys(known).length === 0) return <Fact isStale>gains not read · safe {gainsInBrackets(safe)}</Fact>;
   const isSafe = sameHeld(known, safe);
   return (
-    <span className={classes["fact"]} data-stale={stale || undefined} title={`${names}, read back`}>
-      <span className={classes["word"]}>gains</span>
+    <Fact title={`${Object.keys(safe).join(", ")}, read back`} isStale={stale}>
+      <Text span inherit c="dimmed" visibleFrom="xs">
+        gains
+      </Text>
       {gainsInBrackets(known)}
-      <span className={isSafe ? classes["safe"] : classes["other"]}>
-        {isSafe ? "safe" : `safe ${gainsInBrackets(safe)}`}
-      </span>
-    </span>
+      <strong data-tone={isSafe ? "good" : "warn"}>{isSafe ? "safe" : `safe ${gainsInBrackets(safe)}`}</strong>
+    </Fact>
   );
 }
 
@@ -120,14 +133,10 @@ function InControl({ vehicle }: { vehicle: Vehicle }) {
   const isOwn = own !== null && (control === null || control.operator === own.operator);
   const who = isOwn ? `${own.operator} (you)` : (control?.operator ?? "no operator");
   return (
-    <span
-      className={classes["fact"]}
-      data-stale={(control === null && !isOwn) || undefined}
-      title="Operator in control"
-    >
-      <IconUser size={17} aria-hidden />
-      <span className="visually-hidden">In control:</span>
-      <span className={classes["who"]}>{who}</span>
-    </span>
+    <Fact Icon={IconUser} name="In control:" title="Operator in control" isStale={control === null && !isOwn}>
+      <Text span inherit truncate className={classes["who"] ?? ""}>
+        {who}
+      </Text>
+    </Fact>
   );
 }

@@ -10,12 +10,8 @@ test("a key asks for something unless one types, or the browser has it", () => {
   expect(commandOf(press("?"), true)).toBeNull();
   expect(commandOf(press("/", { ctrlKey: true }), false)).toBeNull();
   expect(commandOf(press("a"), false)).toBeNull();
-  expect(["j", "k", "x", "c"].map((key) => commandOf(press(key), false))).toEqual([
-    "next",
-    "previous",
-    "select",
-    "compare",
-  ]);
+  const commands = [..."jkxc"].map((key) => commandOf(press(key), false));
+  expect(commands).toEqual(["next", "previous", "select", "compare"]);
 });
 
 test("a page's own keys come before those of every page, and abort is on every page", () => {

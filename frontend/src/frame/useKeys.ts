@@ -1,4 +1,4 @@
-import { useEffect } from "react";
+import { useWindowEvent } from "@mantine/hooks";
 import { type Command, commandOf } from "./keys";
 
 function isTyping(target: EventTarget | null): boolean {
@@ -11,13 +11,9 @@ function isTyping(target: EventTarget | null): boolean {
 /** Carry out a command when its key is pressed, unless the user types. The key then has no other effect, but for an act
  * that returns false because there was nothing to do. */
 export function useKeys(acts: Partial<Record<Command, () => unknown>>): void {
-  useEffect(() => {
-    function onKey(event: KeyboardEvent): void {
-      const command = commandOf(event, isTyping(event.target));
-      const act = command === null ? undefined : acts[command];
-      if (act !== undefined && act() !== false) event.preventDefault();
-    }
-    document.addEventListener("keydown", onKey);
-    return () => document.removeEventListener("keydown", onKey);
+  useWindowEvent("keydown", (event) => {
+    const command = commandOf(event, isTyping(event.target));
+    const act = command === null ? undefined : acts[command];
+    if (act !== undefined && act() !== false) event.preventDefault();
   });
 }

@@ -1,5 +1,6 @@
 /** Readiness of a trial's vehicle: the server's answer, taken back by what only this page can tell. */
 
+import { useWindowEvent } from "@mantine/hooks";
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { answer } from "../api/client";
@@ -141,13 +142,9 @@ function stallAfter(at: Moment, now: Moment, stall: Stall | null, returnedAt: Mo
 /** When this tab last came back from the background. */
 function useReturn(): Moment | null {
   const [returnedAt, setReturnedAt] = useState<Moment | null>(null);
-  useEffect(() => {
-    const onVisibility = (): void => {
-      if (document.visibilityState !== "hidden") setReturnedAt(momentNow());
-    };
-    document.addEventListener("visibilitychange", onVisibility);
-    return () => document.removeEventListener("visibilitychange", onVisibility);
-  }, []);
+  useWindowEvent("visibilitychange", () => {
+    if (document.visibilityState !== "hidden") setReturnedAt(momentNow());
+  });
   return returnedAt;
 }
 

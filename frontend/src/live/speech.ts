@@ -1,6 +1,6 @@
 /** Spoken announcements for changes of the event stream. */
 
-import type { LiveFlight } from "./telemetry";
+import { hasLanded, type LiveFlight } from "./telemetry";
 import type { LastHeard, VehicleStatus } from "./vehicleStatus";
 
 /** State of the event stream. */
@@ -87,12 +87,10 @@ function isLow(batteryV: number | null, minBatteryV: number | null): boolean {
   return batteryV !== null && minBatteryV !== null && batteryV < minBatteryV;
 }
 
-const DOWN: ReadonlySet<string> = new Set(["landed", "ended"]);
-
 /** Trials whose flights have just ended. */
 export function justDown(before: News, now: News): number[] {
   return [...now.flights].flatMap(([trialId, { phase }]) =>
-    DOWN.has(phase) && before.flights.get(trialId)?.phase === "flying" ? [trialId] : [],
+    hasLanded(phase) && before.flights.get(trialId)?.phase === "flying" ? [trialId] : [],
   );
 }
 

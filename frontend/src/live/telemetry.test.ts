@@ -26,31 +26,26 @@ const line = JSON.stringify({
   error_so_far: 2.9,
 });
 
-test("telemetry grows the curve and updates the readings", () => {
+function told() {
   const news = telemetryFrom(line);
   if (news === null) throw new Error("the line above is telemetry");
-  const flight = extended(begun(1, 5), news);
-  expect(flight.timeS).toEqual([0.02, 0.04]);
-  expect(flight.measured).toEqual([0.1, 0.2]);
-  expect([flight.throttle, flight.batteryV, flight.errorSoFar]).toEqual([0.9, 11.8, 2.9]);
+  return news;
+}
+
+test("telemetry grows the curve and updates the readings", () => {
+  const readings = { throttle: 0.9, batteryV: 11.8, errorSoFar: 2.9 };
+  expect(extended(begun(1, 5), told())).toMatchObject({ timeS: [0.02, 0.04], measured: [0.1, 0.2], ...readings });
 });
 
 test("another experiment sends other columns, the scored one second", () => {
   const columns = ["time_s", "pitch_error_rad", "elevator_rad"];
   const flight = extended(begun(1, 5), { ...news, columns, samples: [[1, -0.02, 0.1]] });
-  expect([flight.channel, flight.measured, flight.throttle, flight.batteryV]).toEqual([
-    "pitch_error_rad",
-    [-0.02],
-    null,
-    null,
-  ]);
+  expect(flight).toMatchObject({ channel: "pitch_error_rad", measured: [-0.02], throttle: null, batteryV: null });
   expect(readingOf(flight.channel)).toEqual({ title: "Pitch error", unit: "rad", digits: 3 });
 });
 
 test("samples that come twice after a reconnect are drawn once", () => {
-  const news = telemetryFrom(line);
-  if (news === null) throw new Error("the line above is telemetry");
-  expect(extended(extended(begun(1, 5), news), news).timeS).toEqual([0.02, 0.04]);
+  expect(extended(extended(begun(1, 5), told()), told()).timeS).toEqual([0.02, 0.04]);
 });
 
 test("flights of long ago are forgotten, those under way are not", () => {

@@ -1,6 +1,6 @@
 /** Telemetry of flights in progress, from the event stream. */
 
-import { type Aged, isRecordedStep, type Moment } from "./vehicleStatus";
+import { type Aged, isRecordedStep, type Moment, oneOf } from "./vehicleStatus";
 
 export interface LiveFlight {
   campaignId: number;
@@ -110,12 +110,12 @@ export function readingOf(channel: string): { title: string; unit: string; digit
   return CHANNELS[channel] ?? { title: channel, unit: "", digits: 3 };
 }
 
-/** Phases on the ground: finished, or staged and waiting for take-off. */
-const DOWN = new Set(["staged", "landed", "ended"]);
+/** Whether a flight in this phase is over. */
+export const hasLanded = oneOf("landed", "ended");
 
 /** Flights in progress according to the stream, beginning with the staging of their gains. */
 export function underWay(flights: ReadonlyMap<number, LiveFlight>): LiveFlight[] {
-  return [...flights.values()].filter(({ phase }) => !DOWN.has(phase));
+  return [...flights.values()].filter(({ phase }) => phase !== "staged" && !hasLanded(phase));
 }
 
 const KEPT = 8;

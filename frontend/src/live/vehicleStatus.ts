@@ -2,35 +2,62 @@
 
 import type { Vehicle } from "../api/types";
 
-type LinkState = "connecting" | "connected" | "gone" | "not answering";
+const LINKS = ["connecting", "connected", "gone", "not answering"] as const;
 
-export interface VehicleStatus {
-  vehicleId: number;
-  state: LinkState;
+type Event = Readonly<Record<string, unknown>>;
+
+function isNumber(value: unknown): value is number {
+  return typeof value === "number" && Number.isFinite(value);
+}
+
+const number = (field: string) => (event: Event) => (isNumber(event[field]) ? event[field] : null);
+const numberOr0 = (field: string) => (event: Event) => (isNumber(event[field]) ? event[field] : 0);
+const text = (field: string) => (event: Event) => (typeof event[field] === "string" ? event[field] : "");
+
+/** What a status event of the stream says, field by field. */
+const READERS = {
   /** Time of the status, UTC. */
-  at: string;
+  at: text("at"),
   /** Age of the status when it was received, in seconds, for statuses repeated to tabs that join late. */
-  ageS: number;
-  step: string;
+  ageS: numberOr0("age_s"),
+  step: text("step"),
   /** Seconds since the last packet, at the time of the status. */
-  packetAgeS: number | null;
-  heartbeatAgeS: number | null;
-  armed: boolean | null;
-  mode: string;
-  altitudeM: number | null;
-  climbRateMS: number | null;
-  batteryV: number | null;
-  positionHz: number | null;
-  lostShare: number | null;
+  packetAgeS: number("packet_age_s"),
+  heartbeatAgeS: number("heartbeat_age_s"),
+  armed: ({ armed }: Event) => (typeof armed === "boolean" ? armed : null),
+  mode: text("mode"),
+  altitudeM: number("altitude_m"),
+  climbRateMS: number("climb_rate_m_s"),
+  batteryV: number("battery_v"),
+  positionHz: number("position_hz"),
+  lostShare: number("lost_share"),
   /** Gains as last read back; empty if none were. */
-  held: Readonly<Record<string, number>>;
-  said: string;
-  saidAgeS: number | null;
-  trouble: string;
+  held: ({ held }: Event): Readonly<Record<string, number>> =>
+    Object.fromEntries(Object.entries(held ?? {}).filter(([, value]) => isNumber(value))),
+  said: text("said"),
+  saidAgeS: number("said_age_s"),
+  trouble: text("trouble"),
   /** Reason of the quarantine; empty if it may fly. */
-  concern: string;
+  concern: text("concern"),
   /** How often the vehicle has restarted since the connection was opened. */
-  restarts: number;
+  restarts: numberOr0("restarts"),
+};
+
+type Readings = { [Name in keyof typeof READERS]: ReturnType<(typeof READERS)[Name]> };
+
+export interface VehicleStatus extends Readings {
+  vehicleId: number;
+  state: (typeof LINKS)[number];
+}
+
+/** Parse a status event of the stream; null if it is not one. */
+export function statusFrom(json: string): VehicleStatus | null {
+  const event = JSON.parse(json) as Event | null;
+  const vehicleId = event?.["vehicle_id"];
+  const state = LINKS.find((one) => one === event?.["state"]);
+  if (event === null || !isNumber(vehicleId) || state === undefined) return null;
+  const readings = Object.entries(READERS).map(([name, read]) => [name, read(event)]);
+  return { ...(Object.fromEntries(readings) as Readings), vehicleId, state };
 }
 
 /** Two clocks: the wall clock runs while a tablet sleeps, the steady clock cannot be set back. */
@@ -98,8 +125,8 @@ export function isDisarmed(known: Aged | null): boolean {
 
 /** `below 10.5 V` for a battery below the vehicle's minimum; else empty. */
 export function lowBattery({ options }: Pick<Vehicle, "options">, batteryV: number | null | undefined): string {
-  const least = number(options["min_battery_v"]);
-  if (least === null || batteryV === null || batteryV === undefined || batteryV >= least) return "";
+  const least = options["min_battery_v"];
+  if (!isNumber(least) || batteryV === null || batteryV === undefined || batteryV >= least) return "";
   return `below ${least.toFixed(1)} V`;
 }
 
@@ -153,78 +180,22 @@ export function stepWord(step: string): string {
   return STEPS[step] ?? step;
 }
 
-const RECORDED: ReadonlySet<string> = new Set(["take-off", "record", "abort-land"]);
+/** Whether a step or phase, undefined where none is known, is one of these. */
+export function oneOf(...steps: readonly string[]): (step: string | undefined) => boolean {
+  return (step) => step !== undefined && steps.includes(step);
+}
 
 /** Whether samples of the flight arrive in this step; in others the vehicle's own messages tell where it is. */
-export function isRecordedStep(step: string): boolean {
-  return RECORDED.has(step);
-}
-
-const ENDED: ReadonlySet<string> = new Set(["land", "disarm", "restore"]);
+export const isRecordedStep = oneOf("take-off", "record", "abort-land");
 
 /** Whether the record has ended in this step, and the vehicle lands, or has landed. */
-export function isAfterRecord(step: string | undefined): boolean {
-  return step !== undefined && ENDED.has(step);
-}
-
-const ABORTED: ReadonlySet<string> = new Set(["abort-land", "link lost"]);
+export const isAfterRecord = oneOf("land", "disarm", "restore");
 
 /** Whether the vehicle ends the flight before its record is complete. */
-export function isAbortStep(step: string | undefined): boolean {
-  return step !== undefined && ABORTED.has(step);
-}
+export const isAbortStep = oneOf("abort-land", "link lost");
 
 /** Whether the vehicle has landed and disarmed after samples of its flight: there is nothing to abort any more. */
 export function isDown(known: Aged | null, hasSamples: boolean): boolean {
   if (known?.isCurrent !== true) return false;
   return known.status.step === "restore" || (hasSamples && known.status.step === "idle");
-}
-
-function number(value: unknown): number | null {
-  return typeof value === "number" && Number.isFinite(value) ? value : null;
-}
-
-function text(value: unknown): string {
-  return typeof value === "string" ? value : "";
-}
-
-function gains(value: unknown): Record<string, number> {
-  if (typeof value !== "object" || value === null) return {};
-  return Object.fromEntries(
-    Object.entries(value).filter((entry): entry is [string, number] => number(entry[1]) !== null),
-  );
-}
-
-const LINKS: readonly LinkState[] = ["connecting", "connected", "gone", "not answering"];
-
-/** Parse a status event of the stream; null if it is not one. */
-export function statusFrom(json: string): VehicleStatus | null {
-  const parsed: unknown = JSON.parse(json);
-  if (typeof parsed !== "object" || parsed === null) return null;
-  const found = parsed as Record<string, unknown>;
-  const vehicleId = number(found["vehicle_id"]);
-  const state = LINKS.find((one) => one === found["state"]);
-  if (vehicleId === null || state === undefined) return null;
-  return {
-    vehicleId,
-    state,
-    at: text(found["at"]),
-    ageS: number(found["age_s"]) ?? 0,
-    step: text(found["step"]),
-    packetAgeS: number(found["packet_age_s"]),
-    heartbeatAgeS: number(found["heartbeat_age_s"]),
-    armed: typeof found["armed"] === "boolean" ? found["armed"] : null,
-    mode: text(found["mode"]),
-    altitudeM: number(found["altitude_m"]),
-    climbRateMS: number(found["climb_rate_m_s"]),
-    batteryV: number(found["battery_v"]),
-    positionHz: number(found["position_hz"]),
-    lostShare: number(found["lost_share"]),
-    held: gains(found["held"]),
-    said: text(found["said"]),
-    saidAgeS: number(found["said_age_s"]),
-    trouble: text(found["trouble"]),
-    concern: text(found["concern"]),
-    restarts: number(found["restarts"]) ?? 0,
-  };
 }

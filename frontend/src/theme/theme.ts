@@ -61,7 +61,8 @@ export const theme = createTheme({
     title: "var(--text-title)",
   },
   headings: { fontWeight: "650", sizes: { h1: { fontSize: "var(--text-page)", lineHeight: "1.55" } } },
-  breakpoints: { sm: "51.3125em" },
+  /** Phones end below xs; the bar is cramped below md, and in flight below lg. */
+  breakpoints: { xs: "621px", sm: "51.3125em", md: "1181px", lg: "1321px" },
   cursorType: "pointer",
   respectReducedMotion: true,
   components: {

@@ -1,3 +1,4 @@
+import { Text } from "@mantine/core";
 import {
   IconAlertTriangle,
   IconCheck,
@@ -36,7 +37,11 @@ export function VehicleBadge({ isReal, title }: Props) {
     <span className={classes["badge"]} data-real={isReal || undefined}>
       <Icon size={16} aria-hidden />
       <strong>{isReal ? "REAL" : "SIM"}</strong>
-      {title && <span className={classes["title"]}>{title}</span>}
+      {title && (
+        <Text span inherit truncate>
+          {title}
+        </Text>
+      )}
     </span>
   );
 }

@@ -7,7 +7,7 @@ import classes from "./HelpTip.module.css";
 
 /** Help button with an explanation; its touch target is larger than its icon. */
 export function HelpTip({ topic }: { topic: Topic }) {
-  const { question, answer } = EXPLANATIONS[topic];
+  const [question, ...answer] = EXPLANATIONS[topic];
   const id = useId();
   const [open, setOpen] = useState(false);
   return (

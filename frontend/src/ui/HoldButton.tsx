@@ -1,6 +1,9 @@
+import { Text } from "@mantine/core";
+import { useWindowEvent } from "@mantine/hooks";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { type PointerEvent, useCallback, useEffect, useId, useRef, useState } from "react";
 import classes from "./HoldButton.module.css";
+import { Note } from "./Note";
 
 interface Props {
   label: string;
@@ -63,15 +66,9 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
     watch({ sinceMs: now, seenMs: now });
   }
 
-  useEffect(() => {
-    window.addEventListener("blur", interrupt);
-    document.addEventListener("visibilitychange", interrupt);
-    return () => {
-      window.removeEventListener("blur", interrupt);
-      document.removeEventListener("visibilitychange", interrupt);
-      cancelAnimationFrame(frame.current);
-    };
-  }, [interrupt]);
+  useWindowEvent("blur", interrupt);
+  useWindowEvent("visibilitychange", interrupt);
+  useEffect(() => () => cancelAnimationFrame(frame.current), []);
 
   useEffect(() => {
     if (disabled) interrupt();
@@ -99,21 +96,28 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
         onPointerLeave={release}
         onContextMenu={(event) => event.preventDefault()}
       >
-        <svg viewBox="0 0 48 48" width={56} height={56} className={classes["ring"]} aria-hidden>
+        <svg viewBox="0 0 48 48" width={56} height={56} overflow="visible" aria-hidden>
           <circle cx={24} cy={24} r={20} />
-          <circle cx={24} cy={24} r={20} strokeDasharray={AROUND} strokeDashoffset={AROUND * (1 - (share ?? 0))} />
+          <circle
+            cx={24}
+            cy={24}
+            r={20}
+            className={classes["share"]}
+            strokeDasharray={AROUND}
+            strokeDashoffset={AROUND * (1 - (share ?? 0))}
+          />
           <IconPlaneDeparture x={13} y={13} size={22} />
         </svg>
         <span>{share === null ? label : `Keep holding… ${(2 * (1 - share)).toFixed(1)} s`}</span>
       </button>
       {cancelled && (
-        <p role="status" className={classes["interrupted"]}>
+        <Text role="status" mt={8} c="var(--bad)" fw={650}>
           {cancelled}: nothing was sent.{!disabled && " Hold again."}
-        </p>
+        </Text>
       )}
-      <p id={note} className={classes["note"]}>
+      <Note id={note} mt={6} mx={2} fz="fine">
         Hold for 2 s with a finger or pointer; release to cancel.
-      </p>
+      </Note>
     </div>
   );
 }

@@ -1,5 +1,7 @@
+import { Text } from "@mantine/core";
 import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
-import { type FieldProblem, formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
+import type { ReactNode } from "react";
+import { formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
 import { asSentence, stopped } from "./format";
 import classes from "./Notices.module.css";
 
@@ -8,20 +10,6 @@ interface Props {
   error: unknown;
   /** Fields whose reasons are shown at their inputs. */
   shown?: readonly string[];
-}
-
-/** What happened, what it means, what to do. Renders nothing without an error. */
-export function ErrorNotice({ error, shown = [] }: Props) {
-  const problem = problemOf(error);
-  return problem === null ? null : <ProblemNotice problem={problem} shown={shown} />;
-}
-
-/** Why something failed earlier, as the server has stored it. Renders nothing without a reason. */
-export function FailureNotice({ reason }: { reason: string }) {
-  if (reason === "") return null;
-  return (
-    <ProblemNotice problem={{ status: 0, title: asSentence(reason), detail: "", hint: "", problems: [] }} shown={[]} />
-  );
 }
 
 /** What the server's names stand for on a page. */
@@ -40,35 +28,41 @@ const LABELS: Readonly<Record<string, string>> = {
 /** Reasons of the gate are sentences of their own, the others continue the field's name. */
 const isSentence = (reason: string): boolean => /^\p{Lu}/u.test(reason);
 
-function Named({ field, reason }: FieldProblem) {
-  return (
-    <>
-      {LABELS[field] ?? <code>{field}</code>} {stopped(reason)}
-    </>
-  );
-}
-
-function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly string[] }) {
+/** What happened, what it means, what to do. Renders nothing without an error. */
+export function ErrorNotice({ error, shown = [] }: Props) {
+  const problem = problemOf(error);
+  if (problem === null) return null;
+  const { title, detail, hint } = problem;
   const others = otherProblems(problem, shown).filter(({ field }) => field !== "version");
   return (
-    <div className={classes["trouble"]} role="alert">
-      <IconAlertTriangle size={20} aria-hidden />
+    <div className={classes["notice"]} role="alert">
+      <IconAlertTriangle size={20} color="var(--bad)" aria-hidden />
       <div>
-        <strong>{problem.title}</strong>
-        {problem.detail && problem.detail !== problem.title && <p>{problem.detail}</p>}
+        <strong>{title}</strong>
+        {detail && detail !== title && <p>{detail}</p>}
         {others.length > 0 && (
           <ul>
             {others.map(({ field, reason }) => (
               <li key={`${field} ${reason}`}>
-                {isSentence(reason) ? stopped(reason) : <Named field={field} reason={reason} />}
+                {!isSentence(reason) && (LABELS[field] ?? <code>{field}</code>)} {stopped(reason)}
               </li>
             ))}
           </ul>
         )}
-        {problem.hint && <p className={classes["hint"]}>{withCode(problem.hint)}</p>}
+        {hint && (
+          <Text inherit c="dimmed">
+            {withCode(hint)}
+          </Text>
+        )}
       </div>
     </div>
   );
+}
+
+/** Why something failed earlier, as the server has stored it. Renders nothing without a reason. */
+export function FailureNotice({ reason }: { reason: string }) {
+  const problem = { status: 0, title: asSentence(reason), detail: "", hint: "", problems: [] } satisfies Problem;
+  return <ErrorNotice error={reason === "" ? null : problem} />;
 }
 
 interface FormErrorProps {
@@ -82,26 +76,28 @@ export function FormErrorNotice({ error, labels }: FormErrorProps) {
   return <ErrorNotice error={formProblem(error, labels)} shown={Object.keys(labels)} />;
 }
 
-/** Explains why this browser has read-only access; renders nothing without a reason. */
-export function ReadOnlyNotice({ why }: { why: string | null }) {
-  if (why === null) return null;
+interface AccessProps {
+  Icon: typeof IconEye;
+  children: ReactNode;
+}
+
+function AccessNotice({ Icon, children }: AccessProps) {
   return (
-    <p className={classes["watch"]} role="status">
-      <IconEye size={20} aria-hidden />
-      <span>{withCode(why)}</span>
+    <p className={classes["access"]} role="status">
+      <Icon size={20} aria-hidden />
+      <span>{children}</span>
     </p>
   );
 }
 
+/** Explains why this browser has read-only access; renders nothing without a reason. */
+export function ReadOnlyNotice({ why }: { why: string | null }) {
+  return why && <AccessNotice Icon={IconEye}>{withCode(why)}</AccessNotice>;
+}
+
 /** Confirms what this browser may do now; renders nothing without it. */
 export function UnlockedNotice({ what }: { what: string | null }) {
-  if (what === null) return null;
-  return (
-    <p className={classes["watch"]} role="status">
-      <IconLockOpen size={20} aria-hidden />
-      <span>{what}</span>
-    </p>
-  );
+  return what && <AccessNotice Icon={IconLockOpen}>{what}</AccessNotice>;
 }
 
 /** Text between backticks is code. */

@@ -1,3 +1,4 @@
+import { Group, Title } from "@mantine/core";
 import type { ReactNode } from "react";
 import classes from "./Panel.module.css";
 
@@ -11,10 +12,16 @@ interface Props {
 export function Panel({ title, tools, children, className = "" }: Props) {
   return (
     <section className={`${classes["panel"]} ${className}`}>
-      <div className={classes["head"]}>
-        <h2 className={classes["title"]}>{title}</h2>
-        {tools && <div className={classes["tools"]}>{tools}</div>}
-      </div>
+      <Group justify="space-between" gap="4px 10px" mih={48} mb={8}>
+        <Title order={2} fz="strong" lh="inherit" lts="-0.005em">
+          {title}
+        </Title>
+        {tools && (
+          <Group gap={6} ml="auto" wrap="nowrap">
+            {tools}
+          </Group>
+        )}
+      </Group>
       {children}
     </section>
   );

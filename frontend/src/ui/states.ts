@@ -9,31 +9,40 @@ export interface StateLabel {
   tone: Tone;
 }
 
+const inTone =
+  (tone: Tone) =>
+  (word: string): StateLabel => ({ word, tone });
+
+export const quiet = inTone("quiet");
+export const good = inTone("good");
+export const busy = inTone("busy");
+export const bad = inTone("bad");
+
 const CAMPAIGN: Record<CampaignState, StateLabel> = {
-  draft: { word: "Preparing", tone: "busy" },
-  ready: { word: "Not flown yet", tone: "quiet" },
-  flying: { word: "In flight", tone: "busy" },
-  deciding: { word: "Between flights", tone: "quiet" },
-  finished: { word: "Finished", tone: "good" },
-  archived: { word: "Archived", tone: "quiet" },
+  draft: busy("Preparing"),
+  ready: quiet("Not flown yet"),
+  flying: busy("In flight"),
+  deciding: quiet("Between flights"),
+  finished: good("Finished"),
+  archived: quiet("Archived"),
 };
 
 const OUTCOME: Record<string, StateLabel> = {
-  converged: { word: "Converged", tone: "good" },
-  budget: { word: "Flight budget used", tone: "good" },
-  stopped: { word: "Stopped", tone: "quiet" },
+  converged: good("Converged"),
+  budget: good("Flight budget used"),
+  stopped: quiet("Stopped"),
 };
 
 /** Of a campaign that converged without other gains that compare better: its first gains are its best. */
-const NOTHING_BETTER: StateLabel = { word: "No better gains found", tone: "quiet" };
+const NOTHING_BETTER: StateLabel = quiet("No better gains found");
 
 type RehearsalState = Campaign["rehearsal"]["state"];
 
 /** Labels of a real vehicle's campaign that waits for its rehearsal. */
 const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
-  missing: { word: "Rehearsal required", tone: "quiet" },
-  "under way": { word: "Rehearsal in progress", tone: "busy" },
-  failed: { word: "Rehearsal failed", tone: "bad" },
+  missing: quiet("Rehearsal required"),
+  "under way": busy("Rehearsal in progress"),
+  failed: bad("Rehearsal failed"),
 };
 
 interface Standing extends Pick<Campaign, "state" | "outcome" | "verdict"> {
@@ -54,22 +63,22 @@ export function campaignStateLabel({
   if (state === "finished" && outcome === "converged" && verdict === null) return NOTHING_BETTER;
   if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
   const mayFly = state === "ready" || state === "deciding";
-  if (mayFly && vehicle.state === "quarantined") return { word: "Vehicle quarantined", tone: "bad" };
-  if (mayFly && hasPassed) return { word: "Rehearsal passed", tone: "good" };
+  if (mayFly && vehicle.state === "quarantined") return bad("Vehicle quarantined");
+  if (mayFly && hasPassed) return good("Rehearsal passed");
   if (mayFly && REHEARSAL[rehearsal]) return REHEARSAL[rehearsal];
-  return state === "ready" && !vehicle.can_fly ? { word: "Ready", tone: "quiet" } : CAMPAIGN[state];
+  return state === "ready" && !vehicle.can_fly ? quiet("Ready") : CAMPAIGN[state];
 }
 
 const TRIAL: Record<TrialState, StateLabel> = {
-  planned: { word: "Planned", tone: "quiet" },
-  staged: { word: "Staged", tone: "busy" },
-  flying: { word: "In flight", tone: "busy" },
-  captured: { word: "Needs review", tone: "busy" },
-  valid: { word: "Valid", tone: "good" },
-  aborted: { word: "Aborted", tone: "bad" },
-  invalid: { word: "Invalid", tone: "bad" },
-  cancelled: { word: "Cancelled", tone: "quiet" },
-  lost: { word: "Lost", tone: "bad" },
+  planned: quiet("Planned"),
+  staged: busy("Staged"),
+  flying: busy("In flight"),
+  captured: busy("Needs review"),
+  valid: good("Valid"),
+  aborted: bad("Aborted"),
+  invalid: bad("Invalid"),
+  cancelled: quiet("Cancelled"),
+  lost: bad("Lost"),
 };
 
 export function trialStateLabel(state: TrialState): StateLabel {
@@ -77,8 +86,8 @@ export function trialStateLabel(state: TrialState): StateLabel {
 }
 
 /** States of trials that have flown. */
-const FLOWN: ReadonlySet<TrialState> = new Set<TrialState>(["captured", "valid", "aborted", "invalid", "lost"]);
+const FLOWN: readonly TrialState[] = ["captured", "valid", "aborted", "invalid", "lost"];
 
 export function wasFlown(state: TrialState): boolean {
-  return FLOWN.has(state);
+  return FLOWN.includes(state);
 }

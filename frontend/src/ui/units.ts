@@ -14,9 +14,13 @@ export interface Units {
 
 const TAKEOFF: Units = { error: "m", output: "m", gains: "counts", setPoint: 3 };
 
+function experimentOf(catalogue: Catalogue | undefined, experiment: string) {
+  return catalogue?.experiments.find(({ name }) => name === experiment);
+}
+
 /** Units of the experiment; those of the takeoff until the catalogue is loaded. */
 export function unitsOf(catalogue: Catalogue | undefined, experiment: string): Units {
-  const found = catalogue?.experiments.find(({ name }) => name === experiment);
+  const found = experimentOf(catalogue, experiment);
   if (found === undefined) return TAKEOFF;
   const units = new Set(found.gains.map(({ unit }) => unit));
   return {
@@ -29,13 +33,13 @@ export function unitsOf(catalogue: Catalogue | undefined, experiment: string): U
 
 /** Titles of gains by name: `theta_1` is "Thrust per speed". Empty until the catalogue is loaded. */
 export function gainTitles(catalogue: Catalogue | undefined, experiment: string): Readonly<Record<string, string>> {
-  const found = catalogue?.experiments.find(({ name }) => name === experiment);
-  return Object.fromEntries((found?.gains ?? []).map(({ name, title }) => [name, title]));
+  const { gains = [] } = experimentOf(catalogue, experiment) ?? {};
+  return Object.fromEntries(gains.map(({ name, title }) => [name, title]));
 }
 
 /** Whether errors can be predicted: there is a model of the controller. True until the catalogue is loaded. */
 export function useHasModel(experiment: string): boolean {
-  return useCatalogue().data?.experiments.find(({ name }) => name === experiment)?.has_model ?? true;
+  return experimentOf(useCatalogue().data, experiment)?.has_model ?? true;
 }
 
 /** Experiments that a new campaign can have: those that a kind of vehicle flies. */

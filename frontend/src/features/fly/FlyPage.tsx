@@ -1,6 +1,6 @@
-import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Group, Skeleton, Stack, Text, Title, useComputedColorScheme } from "@mantine/core";
 import { IconAlertOctagonFilled, IconChevronLeft } from "@tabler/icons-react";
-import { useCallback, useMemo, useRef, useState } from "react";
+import { useMemo, useRef, useState } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { type TimeRange, useCampaign, useCampaignFigure, useCatalogue, useTrial } from "../../api/queries";
@@ -12,9 +12,10 @@ import { type PlotlyFigure, wholeFlight, withChosen, withLimit, withTimeRange } 
 import { type AbortControl, abortStage, isCutShort } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
-import { type LiveFlight, readingOf } from "../../live/telemetry";
+import { hasLanded, type LiveFlight, readingOf } from "../../live/telemetry";
 import { isAfterRecord, isDisarmed, isDown } from "../../live/vehicleStatus";
 import { VehicleBadge } from "../../ui/Badges";
+import { asSentence } from "../../ui/format";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ReadOnlyNotice } from "../../ui/Notices";
 import { useGainTitles, useUnits } from "../../ui/units";
@@ -22,31 +23,28 @@ import { useTitle } from "../../ui/useTitle";
 import { windowOf } from "../campaign/campaignSettings";
 import { CommandResult, LandNow, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
-import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAirborneStep } from "./flyScreen";
+import { type FlyStep, flyStateLabel, flyStep, gainsShown, isAirborneStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
 
 export function FlyPage() {
   const trialId = Number(useParams()["trialId"]);
-  return Number.isInteger(trialId) ? <FlyByTrial key={trialId} trialId={trialId} /> : <NotFoundPage />;
+  return Number.isInteger(trialId) ? <FlyTrial key={trialId} trialId={trialId} /> : <NotFoundPage />;
 }
 
-function FlyByTrial({ trialId }: { trialId: number }) {
+function FlyTrial({ trialId }: { trialId: number }) {
   const trial = useTrial(trialId);
+  const campaign = useCampaign(trial.data?.campaign_id ?? null);
+  const { registered = false, id = null } = campaign.data?.vehicle ?? {};
+  const vehicle = useVehicle(registered ? id : null);
   useTitle(trial.data ? `Fly flight ${trial.data.number}` : "Fly");
-  if (trial.data) return <FlyOfCampaign trial={trial.data} />;
-  return trial.error ? <NotFound error={trial.error} /> : <Skeleton height={480} radius="md" />;
-}
-
-function FlyOfCampaign({ trial }: { trial: Trial }) {
-  const campaign = useCampaign(trial.campaign_id);
-  const vehicle = useVehicle(campaign.data?.vehicle.registered ? campaign.data.vehicle.id : null);
-  if (campaign.error) return <NotFound error={campaign.error} />;
-  if (campaign.data === undefined) return <Skeleton height={480} radius="md" />;
-  if (!campaign.data.vehicle.registered) return <Screen campaign={campaign.data} trial={trial} vehicle={null} />;
-  if (vehicle === null) return <Skeleton height={480} radius="md" />;
-  return <Screen campaign={campaign.data} trial={trial} vehicle={vehicle} />;
+  const error = trial.data ? campaign.error : trial.error;
+  if (error) return <NotFound error={error} />;
+  if (trial.data === undefined || campaign.data === undefined || (registered && vehicle === null)) {
+    return <Skeleton height={480} radius="md" />;
+  }
+  return <Screen campaign={campaign.data} trial={trial.data} vehicle={vehicle} />;
 }
 
 interface Props {
@@ -56,7 +54,7 @@ interface Props {
 }
 
 /** Steps without actions in a quarantine or with read-only access. */
-const BARRED: ReadonlySet<FlyStep> = new Set<FlyStep>(["plan", "staging", "staged", "unstaging"]);
+const BARRED: readonly FlyStep[] = ["plan", "staging", "staged", "unstaging"];
 
 /** All readings and actions to stage, fly and review a flight. */
 function Screen({ campaign, trial, vehicle }: Props) {
@@ -68,7 +66,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const unit = useUnits(experiment).error;
   const titles = useGainTitles(experiment);
   const windowS = windowOf(campaign.definition, useCatalogue().data);
-  const { figure, summary } = useTakeoffs(campaign, trial, groundOf(live));
+  const { figure, summary } = useTakeoffs(trial, groundOf(live));
   const step = flyStep(trial, live?.phase ?? null);
   const concern = status?.status.concern || vehicle?.concern || "";
   const quarantined = vehicle !== null && (vehicle.state === "quarantined" || (status?.status.concern ?? "") !== "");
@@ -81,7 +79,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const { word, tone } = flyStateLabel(trial, step, status, {
     quarantined,
     readiness,
-    hasFlown: wasAirborne || hasLanded(live?.phase ?? null),
+    hasFlown: wasAirborne || hasLanded(live?.phase),
     hasLostLink,
     isStopped: orders.said?.order === "motors off" && orders.said.accepted,
   });
@@ -91,7 +89,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const isAborted = useLatched(flightId, isFlying && isAborting);
   const isLanded = isFlying && isDown(status, (live?.timeS.length ?? 0) > 0);
   const watching = useReadOnlyReason(vehicle);
-  const barred = BARRED.has(step) && (quarantined || watching !== null);
+  const barred = BARRED.includes(step) && (quarantined || watching !== null);
   const steps = {
     campaign,
     trial,
@@ -104,15 +102,15 @@ function Screen({ campaign, trial, vehicle }: Props) {
   return (
     <div className={classes["screen"]} data-step={step}>
       <div className={classes["head"]}>
-        <Anchor component={Link} to={`/campaigns/${campaign.id}`} className={classes["back"]}>
+        <Anchor component={Link} to={`/campaigns/${campaign.id}`} fz="body" className={classes["back"]}>
           <IconChevronLeft size={20} aria-hidden />
-          <span>
+          <Text span inherit truncate>
             Flight {trial.number} · {campaign.name}
-          </span>
+          </Text>
         </Anchor>
-        <h1 className={classes["word"]} data-tone={tone}>
+        <Title flex={1} lh={1.15} c="var(--tone)" className={classes["word"] ?? ""} data-tone={tone}>
           {word}
-        </h1>
+        </Title>
         <p className="visually-hidden" role="status">
           Flight {trial.number}: {word}
         </p>
@@ -124,29 +122,27 @@ function Screen({ campaign, trial, vehicle }: Props) {
         )}
         {vehicle === null && <VehicleBadge isReal={campaign.vehicle.is_real} title={campaign.vehicle.title} />}
       </div>
-      <div className={classes["watch"]}>
-        <Readouts
-          trial={trial}
-          unit={unit}
-          live={live}
-          status={status}
-          vehicle={vehicle}
-          isFlying={isFlying}
-          isAborted={isAborted}
-          isRecordOver={isLanded || isAfterRecord(status?.status.step)}
-          windowS={windowS}
-          endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
-        />
-        <div className={classes["chart"]}>
-          {figure !== null && (
-            <Chart
-              figure={figure}
-              label={`Live curve. ${summary}`}
-              height={null}
-              liveTrial={isFlying ? trial.id : null}
-            />
-          )}
-        </div>
+      <Readouts
+        trial={trial}
+        unit={unit}
+        live={live}
+        status={status}
+        vehicle={vehicle}
+        isFlying={isFlying}
+        isAborted={isAborted}
+        isRecordOver={isLanded || isAfterRecord(status?.status.step)}
+        windowS={windowS}
+        endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
+      />
+      <div className={classes["chart"]}>
+        {figure !== null && (
+          <Chart
+            figure={figure}
+            label={`Live curve. ${summary}`}
+            height={null}
+            liveTrial={isFlying ? trial.id : null}
+          />
+        )}
       </div>
       <section className={classes["steps"]} aria-label="Next action">
         {readiness !== null && (
@@ -185,25 +181,19 @@ function groundOf(live: LiveFlight | null): number {
   return live !== null && readingOf(live.channel).unit === "m" ? Math.round(10 * firstM) / 10 : 0;
 }
 
-function useTakeoffs(
-  campaign: Campaign,
-  trial: Trial,
-  groundM: number,
-): { figure: PlotlyFigure | null; summary: string } {
+/** Its curve beside the earlier ones, over all of its time. */
+function useTakeoffs({ campaign_id, number }: Trial, groundM: number) {
   const theme = useComputedColorScheme("light");
   const [window, setWindow] = useState<TimeRange | null>(null);
-  const card = useCampaignFigure(campaign.id, "takeoffs", theme, { window, predicted: trial.number }).data;
-  const raw = card?.figure;
-  const whole = raw ? wholeFlight(raw as unknown as PlotlyFigure) : null;
+  const card = useCampaignFigure(campaign_id, "takeoffs", theme, { window, predicted: number }).data;
+  const raw = card?.figure as PlotlyFigure | null | undefined;
+  const whole = raw ? wholeFlight(raw) : null;
   if (whole !== null && whole.join() !== window?.join()) setWindow(whole);
-  const dress = useCallback(
-    (drawn: PlotlyFigure): PlotlyFigure => {
-      const { data, layout } = withLimit(drawn, groundM);
-      return { data: withChosen(data, trial.number), layout: withTimeRange(layout, wholeFlight(drawn)) };
-    },
-    [trial.number, groundM],
-  );
-  const figure = useMemo(() => (raw ? dress(raw as unknown as PlotlyFigure) : null), [raw, dress]);
+  const figure = useMemo(() => {
+    if (!raw) return null;
+    const { data, layout } = withLimit(raw, groundM);
+    return { data: withChosen(data, number), layout: withTimeRange(layout, wholeFlight(raw)) };
+  }, [raw, number, groundM]);
   return { figure, summary: card?.summary ?? "" };
 }
 
@@ -217,19 +207,23 @@ interface QuarantineProps {
 /** Reason of the quarantine, the Land command, and a link to the release. */
 function Quarantine({ vehicle, concern, isDown, orders }: QuarantineProps) {
   return (
-    <section className={classes["quarantine"]}>
+    <Stack gap={10} className={classes["quarantine"] ?? ""}>
       <div role="alert">
-        <h2>
+        <Group gap={8} c="var(--bad)">
           <IconAlertOctagonFilled size={24} aria-hidden />
-          Do not fly
-        </h2>
-        <p>{concern}</p>
+          <Title order={2} fz="title">
+            Do not fly
+          </Title>
+        </Group>
+        <Text mt={4} lh={1.4}>
+          {asSentence(concern)}
+        </Text>
       </div>
       <LandNow isDown={isDown} orders={orders} />
       {orders.said?.order === "land" && <CommandResult orders={orders} isDown={isDown} />}
       <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="inline-block" py={12}>
         Inspect and release {vehicle.name}
       </Anchor>
-    </section>
+    </Stack>
   );
 }

@@ -1,5 +1,6 @@
 import { IconAlertTriangleFilled, IconCircle, IconCircleCheckFilled, IconCircleXFilled } from "@tabler/icons-react";
 import type { Readiness, ReadinessStep } from "../../live/readiness";
+import { Aside } from "../../ui/Aside";
 import { withCode } from "../../ui/Notices";
 import classes from "./ReadinessStepper.module.css";
 
@@ -15,9 +16,9 @@ const TITLES: Record<ReadinessStep, string> = {
 const STEPS = Object.keys(TITLES) as ReadinessStep[];
 
 const STANDINGS = {
-  done: { Icon: IconCircleCheckFilled, word: "done" },
-  lost: { Icon: IconCircleXFilled, word: "lost" },
-  open: { Icon: IconCircle, word: "not reached" },
+  done: { Icon: IconCircleCheckFilled, word: "done", tone: "good" },
+  lost: { Icon: IconCircleXFilled, word: "lost", tone: "bad" },
+  open: { Icon: IconCircle, word: "not reached", tone: "quiet" },
 } as const;
 
 function standingOf(step: ReadinessStep, { steps, lost }: Readiness): keyof typeof STANDINGS {
@@ -40,9 +41,9 @@ export function ReadinessStepper({ readiness, needsOperator }: Props) {
     <ol className={classes["stepper"]} aria-label="Readiness">
       {STEPS.filter((step) => needsOperator || !OPERATORS.has(step)).map((step) => {
         const standing = standingOf(step, readiness);
-        const { Icon, word } = STANDINGS[standing];
+        const { Icon, word, tone } = STANDINGS[standing];
         return (
-          <li key={step} data-standing={standing}>
+          <li key={step} data-standing={standing} data-tone={tone}>
             <Icon size={20} aria-hidden />
             {TITLES[step]}
             <span className="visually-hidden">: {word}</span>
@@ -56,11 +57,11 @@ export function ReadinessStepper({ readiness, needsOperator }: Props) {
 /** Why steps were taken back, and the way on. */
 export function ReadinessLosses({ losses }: Pick<Readiness, "losses">) {
   return losses.map(({ kind, what, way_on }) => (
-    <p key={kind} role="alert" className={classes["loss"]}>
-      <IconAlertTriangleFilled size={20} aria-hidden />
+    <Aside key={kind} tone="bad" fz="small" display="flex" style={{ gap: 8 }} role="alert">
+      <IconAlertTriangleFilled size={20} color="var(--bad)" aria-hidden />
       <span>
         <strong>{what}</strong> {withCode(way_on)}
       </span>
-    </p>
+    </Aside>
   ));
 }

@@ -1,3 +1,4 @@
+import { Stack } from "@mantine/core";
 import { IconCircleCheckFilled, IconCircleDashed } from "@tabler/icons-react";
 import { useRef } from "react";
 import type { Trial, Vehicle } from "../../api/types";
@@ -33,15 +34,20 @@ interface Props {
 interface ReadingProps {
   title: string;
   value: string;
-  topic?: Topic;
-  size?: "huge" | "large" | "usual";
+  topic?: Topic | undefined;
+  size?: "huge" | "large";
   stale?: boolean;
   bad?: boolean;
 }
 
-function Reading({ title, value, topic, size = "usual", stale = false, bad = false }: ReadingProps) {
+function Reading({ title, value, topic, size, stale, bad }: ReadingProps) {
   return (
-    <div className={classes["reading"]} data-size={size} data-stale={stale || undefined} data-bad={bad || undefined}>
+    <div
+      className={classes["reading"]}
+      data-size={size}
+      data-stale={stale || undefined}
+      data-tone={bad ? "bad" : undefined}
+    >
       <dt>
         {title} {topic && <HelpTip topic={topic} />}
       </dt>
@@ -99,11 +105,11 @@ export function Readouts({
   const predicted =
     trial.predicted_error === null || isScored ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
-    <div className={`${classes["readouts"]} numbers`}>
+    <Stack gap={8} className={`${classes["readouts"]} numbers`}>
       <dl className={classes["row"]}>
         <Reading
           title={stale ? `${reading.title}, last known` : reading.title}
-          {...(reading.unit === "m" && { topic: "altitude" as const })}
+          topic={reading.unit === "m" ? "altitude" : undefined}
           value={withUnit(stale ? lastOutput : output, reading.unit, reading.digits)}
           size="huge"
           stale={stale}
@@ -143,7 +149,7 @@ export function Readouts({
           />
         )}
       </dl>
-    </div>
+    </Stack>
   );
 }
 
@@ -174,7 +180,9 @@ export function HeldGains({ asked, readBack, held, titles, areSet }: HeldGainsPr
               {tick.name} <small>{titles[tick.name]}</small>
             </th>
             <td>{gainText(tick.asked)}</td>
-            <td className={classes["tick"]}>{areSet ? <Tick tick={tick} /> : <Now held={tick.held} />}</td>
+            <td>
+              <Tick {...tick} areSet={areSet} />
+            </td>
           </tr>
         ))}
       </tbody>
@@ -182,16 +190,13 @@ export function HeldGains({ asked, readBack, held, titles, areSet }: HeldGainsPr
   );
 }
 
-function Now({ held }: { held: number | null }) {
-  return <small>{held === null ? "" : `now ${gainText(held)}`}</small>;
-}
-
-function Tick({ tick: { held, confirmed } }: { tick: GainTick }) {
-  if (confirmed) return <IconCircleCheckFilled size={22} aria-label="read back" className={classes["confirmed"]} />;
+function Tick({ held, confirmed, areSet }: GainTick & Pick<HeldGainsProps, "areSet">) {
+  if (areSet && confirmed) return <IconCircleCheckFilled size={22} color="var(--best)" aria-label="read back" />;
+  const now = held === null ? "" : `now ${gainText(held)}`;
   return (
     <>
-      <small>{held === null ? "not read" : `now ${gainText(held)}`}</small>
-      <IconCircleDashed size={22} aria-hidden />
+      <small>{areSet ? now || "not read" : now}</small>
+      {areSet && <IconCircleDashed size={22} color="var(--edge)" aria-hidden />}
     </>
   );
 }

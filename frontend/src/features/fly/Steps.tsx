@@ -1,5 +1,5 @@
-import { Anchor, Button, Loader, Stack } from "@mantine/core";
-import { IconAlertTriangle, IconOctagonFilled, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
+import { Anchor, Button, Group, Loader, Stack, Text } from "@mantine/core";
+import { IconAlertTriangle, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -7,12 +7,15 @@ import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";
 import type { Campaign, CheckItem, Trial, Vehicle } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
-import { ABORT_LABELS, type AbortControl, abortStage, abortText } from "../../live/flights";
+import { type AbortControl, abortStage, abortText } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
+import { AbortButton } from "../../ui/AbortButton";
+import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import { asSentence } from "../../ui/format";
 import { sameHeld } from "../../ui/gains";
 import { HoldButton } from "../../ui/HoldButton";
+import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { trialStateLabel } from "../../ui/states";
 import { FlightMarkers, PredictionResult } from "../campaign/flights/FlightMarkers";
@@ -83,20 +86,19 @@ function SafeGainsResult({ trial, vehicle }: { trial: Trial; vehicle: Vehicle })
   const { flight, flown_at } = trial;
   const status = useVehicleStatus(vehicle.id);
   if (flight === null || flown_at === null) return null;
-  if (flight.safe_gains_restored === true)
-    return <p className={classes["quiet"]}>Safe gains restored and read back.</p>;
+  if (flight.safe_gains_restored === true) return <Note fz="small">Safe gains restored and read back.</Note>;
   const areReported = status?.isCurrent === true && sameHeld(status.status.held, vehicle.safe_gains);
   if (areReported || areReadBackSince(trial, vehicle)) {
     return (
-      <p className={classes["quiet"]}>
+      <Note fz="small">
         The safe gains were not confirmed at the end of the flight. The vehicle has reported them since.
-      </p>
+      </Note>
     );
   }
   return (
-    <p role="alert" className={classes["checks"]}>
+    <Aside tone="warn" fz="small" role="alert">
       {leftGainsText(flight)}
-    </p>
+    </Aside>
   );
 }
 
@@ -122,12 +124,12 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
               <SpeedSwitch />
             </>
           ) : (
-            <p className={classes["say"]}>
+            <Text fz="body" lh={1.4}>
               Gainline does not fly this vehicle.{" "}
               <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
                 Upload the flight record
               </Anchor>
-            </p>
+            </Text>
           )}
           <FlightProblem flight={trial.flight} />
           <ErrorNotice error={fly.error} />
@@ -155,13 +157,13 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
   const wantsControl = isOthers || (vehicle.is_real && !isInControl);
   if (wantsRehearsal(campaign)) {
     return (
-      <p className={classes["say"]}>
+      <Text fz="body" lh={1.4}>
         {vehicle.name} is a real vehicle, and this campaign has not passed its rehearsal yet (
         {campaign.rehearsal.reason}).{" "}
         <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
           Rehearse first
         </Anchor>
-      </p>
+      </Text>
     );
   }
   const mayStage = vehicle.actions.includes("stage") && trial.actions.includes("stage") && !isBlocked;
@@ -183,11 +185,11 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
       >
         Stage gains
       </Button>
-      <p className={classes["quiet"]}>
+      <Note fz="small">
         {wantsControl
           ? "Take control first."
           : "Writes these gains to the landed, disarmed vehicle and reads each back. It does not move."}
-      </p>
+      </Note>
       <PreflightChecks checks={vehicle.checks ?? []} />
       <ErrorNotice error={stage.error} />
     </Stack>
@@ -234,33 +236,22 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
         Unstage (restore safe gains)
       </Button>
       {!isCurrent && (
-        <p className={classes["quiet"]}>The safe gains can be restored once data is received from the vehicle again.</p>
+        <Note fz="small">The safe gains can be restored once data is received from the vehicle again.</Note>
       )}
       <ErrorNotice error={takeOff.error ?? unstage.error} />
     </Stack>
   );
 }
 
-interface AbortProps {
-  trial: Trial;
-  abort: AbortControl;
-  /** null for a simulation without a link. */
-  vehicle: Vehicle | null;
-}
-
-/** Aborts without confirmation. */
-function Abort({ trial, abort, vehicle }: AbortProps) {
+/** `vehicle` is null for a simulation without a link. */
+function Abort({ trial, abort, vehicle }: Pick<Props, "trial" | "abort"> & { vehicle: Vehicle | null }) {
   const status = useVehicleStatus(vehicle?.id ?? null);
   const stage = abortStage(trial.id, abort, status?.status.step);
   const { state, worker } = useConnection();
   return (
     <Stack gap={12}>
-      <button type="button" className={classes["abort"]} data-stage={stage} onClick={() => abort.press([trial.id])}>
-        <IconOctagonFilled size={40} aria-hidden />
-        {ABORT_LABELS[stage]}
-        {stage === "none" && <kbd>Space</kbd>}
-      </button>
-      <p className={classes["quiet"]}>{abortText(stage, state === "live" && worker, status?.isCurrent === false)}</p>
+      <AbortButton trialId={trial.id} stage={stage} abort={abort} isLarge />
+      <Note fz="small">{abortText(stage, state === "live" && worker, status?.isCurrent === false)}</Note>
     </Stack>
   );
 }
@@ -268,10 +259,10 @@ function Abort({ trial, abort, vehicle }: AbortProps) {
 function Waiting({ text, children }: { text: string; children?: ReactNode }) {
   return (
     <Stack gap={12}>
-      <p className={classes["waiting"]}>
+      <Group gap={14} mih={84} wrap="nowrap" lh={1.4}>
         <Loader size="sm" aria-hidden />
         {text}
-      </p>
+      </Group>
       {children}
     </Stack>
   );
@@ -282,16 +273,18 @@ function PreflightChecks({ checks }: { checks: readonly CheckItem[] }) {
   const failed = checks.filter(({ passed }) => !passed);
   if (failed.length === 0) return null;
   return (
-    <ul className={classes["checks"]} aria-label="Failed preflight checks">
-      {failed.map(({ name, title, found, needed, hint }) => (
-        <li key={name}>
-          <IconAlertTriangle size={18} aria-hidden />
-          <span>
-            <strong>{title}</strong>: {found}, required {needed}.{hint && ` ${hint}`}
-          </span>
-        </li>
-      ))}
-    </ul>
+    <Aside tone="warn" fz="small">
+      <ul className={classes["checks"]} aria-label="Failed preflight checks">
+        {failed.map(({ name, title, found, needed, hint }) => (
+          <li key={name}>
+            <IconAlertTriangle size={18} color="var(--warn)" aria-hidden />
+            <span>
+              <strong>{title}</strong>: {found}, required {needed}.{hint && ` ${hint}`}
+            </span>
+          </li>
+        ))}
+      </ul>
+    </Aside>
   );
 }
 
@@ -309,12 +302,16 @@ function FlightReviewCard({ campaign, trial, isTold = false }: FlightReviewCardP
   const page = `/campaigns/${campaign.id}`;
   return (
     <Stack gap={12}>
-      <p className={classes["marks"]}>
+      <Group gap="4px 12px">
         <StateBadge words={trialStateLabel(trial.state)} />
         <PredictionResult trial={trial} />
         <FlightMarkers trial={trial} />
-      </p>
-      {trial.state !== "captured" && !isTold && <p className={classes["say"]}>{asSentence(sentenceOf(trial))}</p>}
+      </Group>
+      {trial.state !== "captured" && !isTold && (
+        <Text fz="body" lh={1.4}>
+          {asSentence(sentenceOf(trial))}
+        </Text>
+      )}
       {watching === null && (
         <>
           <AbortCause trial={trial} />
@@ -324,7 +321,7 @@ function FlightReviewCard({ campaign, trial, isTold = false }: FlightReviewCardP
           <FlightNotes trial={trial} />
         </>
       )}
-      <div className={classes["onward"]}>
+      <Stack gap={0} align="center">
         {trial.state !== "captured" && trial.state !== "lost" && (
           <Button component={Link} to={page} size="lg" fullWidth>
             Next flight
@@ -333,7 +330,7 @@ function FlightReviewCard({ campaign, trial, isTold = false }: FlightReviewCardP
         <Anchor component={Link} to={`${page}/flights/${trial.id}`} display="inline-block" py={12}>
           Open flight
         </Anchor>
-      </div>
+      </Stack>
     </Stack>
   );
 }

@@ -2,9 +2,9 @@
 
 import type { Trial, TrialState, Vehicle } from "../../api/types";
 import type { Loss, Readiness } from "../../live/readiness";
-import { type Aged, isAbortStep, stepWord } from "../../live/vehicleStatus";
+import { type Aged, isAbortStep, oneOf, stepWord } from "../../live/vehicleStatus";
 import { sameHeld } from "../../ui/gains";
-import { type StateLabel, trialStateLabel } from "../../ui/states";
+import { bad, busy, good, quiet, type StateLabel, trialStateLabel } from "../../ui/states";
 
 /**
  * plan: before staging. staged: gains are on the vehicle, before takeoff. unstaging: safe gains are restored. judge: it
@@ -26,12 +26,10 @@ const STEPS: Record<TrialState, FlyStep> = {
 
 type Standing = Pick<Trial, "state" | "flight">;
 
-const UNDER_WAY: ReadonlySet<string> = new Set(["requested", "running"]);
-
 /** Current step of the flight. `phase` is from the event stream, which may be ahead of the stored state. */
 export function flyStep(trial: Standing, phase: string | null): FlyStep {
   const step = STEPS[trial.state];
-  const underWay = trial.flight !== null && UNDER_WAY.has(trial.flight.state);
+  const underWay = trial.flight?.state === "requested" || trial.flight?.state === "running";
   if (step === "plan" && underWay) return phase === "flying" ? "flying" : "staging";
   if (step !== "staged") return step;
   if (phase === "flying" || trial.flight?.take_off_at) return "flying";
@@ -39,16 +37,16 @@ export function flyStep(trial: Standing, phase: string | null): FlyStep {
 }
 
 const WORDS: Record<FlyStep, StateLabel> = {
-  plan: { word: "Planned", tone: "quiet" },
-  staging: { word: "Staging", tone: "busy" },
-  staged: { word: "Staged, ready to fly", tone: "good" },
-  unstaging: { word: "Restoring safe gains", tone: "busy" },
-  flying: { word: "In flight", tone: "busy" },
-  judge: { word: "Landed", tone: "busy" },
-  over: { word: "Finished", tone: "quiet" },
+  plan: quiet("Planned"),
+  staging: busy("Staging"),
+  staged: good("Staged, ready to fly"),
+  unstaging: busy("Restoring safe gains"),
+  flying: busy("In flight"),
+  judge: busy("Landed"),
+  over: quiet("Finished"),
 };
 
-const IN_FLIGHT: ReadonlySet<string> = new Set([
+const isFlightStep = oneOf(
   "preflight",
   "arm",
   "take-off",
@@ -58,7 +56,7 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
   "link lost",
   "disarm",
   "restore",
-]);
+);
 
 /** What is lost between this page and the vehicle's link: whether the link itself is, cannot be known then. */
 const AWAY: Readonly<Partial<Record<Loss["kind"], string>>> = {
@@ -67,12 +65,12 @@ const AWAY: Readonly<Partial<Record<Loss["kind"], string>>> = {
 };
 
 function stagedLabel(readiness: Readiness | null): StateLabel {
-  if (readiness === null) return { word: "Checking readiness", tone: "busy" };
+  if (readiness === null) return busy("Checking readiness");
   if (readiness.is_ready) return WORDS.staged;
   const isOnlyControl = readiness.losses.every(
     ({ kind }) => kind === "control ended" || kind === "controlled by other",
   );
-  return isOnlyControl ? { word: "Staged", tone: "quiet" } : { word: "Not ready to fly", tone: "bad" };
+  return isOnlyControl ? quiet("Staged") : bad("Not ready to fly");
 }
 
 interface Around {
@@ -86,11 +84,6 @@ interface Around {
   hasLostLink?: boolean;
 }
 
-/** Whether the flight is over, by its phase from the event stream. */
-export function hasLanded(phase: string | null): boolean {
-  return phase === "landed" || phase === "ended";
-}
-
 /** Main label. For a vehicle with a link, `status` has the step; a stale one is never "In flight". */
 export function flyStateLabel(
   trial: Standing,
@@ -100,26 +93,22 @@ export function flyStateLabel(
 ): StateLabel {
   if (step === "flying" && status !== null) {
     const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
-    if (away !== undefined) return { word: away, tone: "bad" };
-    if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
-    if (status.status.step === "abort-land" && hasLostLink) return { word: "Landing after link loss", tone: "bad" };
-    if (IN_FLIGHT.has(status.status.step)) {
+    if (away !== undefined) return bad(away);
+    if (!status.isCurrent) return bad(stepWord("link lost"));
+    if (status.status.step === "abort-land" && hasLostLink) return bad("Landing after link loss");
+    if (isFlightStep(status.status.step)) {
       return { word: stepWord(status.status.step), tone: isAbortStep(status.status.step) ? "bad" : "busy" };
     }
-    if (isStopped) return { word: "Motors off", tone: "bad" };
-    if (!quarantined) return { word: hasFlown ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
+    if (isStopped) return bad("Motors off");
+    if (!quarantined) return busy(hasFlown ? "Landed, restoring safe gains" : "Starting");
   }
-  if (quarantined) return { word: "Quarantined", tone: "bad" };
+  if (quarantined) return bad("Quarantined");
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialStateLabel(trial.state);
   return step === "staged" ? stagedLabel(readiness) : WORDS[step];
 }
 
-const AIRBORNE: ReadonlySet<string> = new Set(["take-off", "record", "land", "abort-land"]);
-
 /** Whether the vehicle is in the air in this step. */
-export function isAirborneStep(step: string | undefined): boolean {
-  return step !== undefined && AIRBORNE.has(step);
-}
+export const isAirborneStep = oneOf("take-off", "record", "land", "abort-land");
 
 export interface GainTick {
   name: string;
