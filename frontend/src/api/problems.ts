@@ -55,20 +55,17 @@ function text(value: unknown): string {
   return typeof value === "string" ? value : "";
 }
 
-function fieldProblems(value: unknown): FieldProblem[] {
-  if (!Array.isArray(value)) return [];
-  return value.flatMap((entry: unknown) => {
-    if (typeof entry !== "object" || entry === null) return [];
-    const { field, reason, offer } = entry as Record<string, unknown>;
-    if (typeof field !== "string" || typeof reason !== "string") return [];
-    const offered = offeredBy(offer);
-    return [{ field, reason, ...(Object.keys(offered).length > 0 ? { offer: offered } : {}) }];
-  });
+function record(value: unknown): Record<string, unknown> {
+  return typeof value === "object" && value !== null ? (value as Record<string, unknown>) : {};
 }
 
-function offeredBy(value: unknown): Record<string, number> {
-  if (typeof value !== "object" || value === null) return {};
-  return Object.fromEntries(Object.entries(value).filter(([, number]) => typeof number === "number"));
+function fieldProblems(value: unknown): FieldProblem[] {
+  if (!Array.isArray(value)) return [];
+  return value.map(record).flatMap(({ field, reason, offer }) => {
+    if (typeof field !== "string" || typeof reason !== "string") return [];
+    const offered = Object.entries(record(offer)).filter((one): one is [string, number] => typeof one[1] === "number");
+    return [{ field, reason, ...(offered.length > 0 && { offer: Object.fromEntries(offered) }) }];
+  });
 }
 
 /** Gain values that would pass, of all refusals together. */
@@ -91,7 +88,7 @@ const TITLES: Readonly<Record<string, string>> = {
 /** Convert the response of a failed request to a problem. */
 export function problemFrom(status: number | undefined, body: unknown): Problem {
   if (status === undefined) return UNREACHABLE;
-  const found = (typeof body === "object" && body !== null ? body : {}) as Record<string, unknown>;
+  const found = record(body);
   return {
     status,
     title:

@@ -49,7 +49,8 @@ export function NumberField({
   );
 }
 
-function scaled(entry: NumberEntry, factor: number): NumberEntry {
+/** The entry times a factor, if it is a number. */
+export function scaled(entry: NumberEntry, factor: number): NumberEntry {
   return typeof entry === "number" ? Number((factor * entry).toPrecision(12)) : entry;
 }
 

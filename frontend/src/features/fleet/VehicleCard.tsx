@@ -1,4 +1,4 @@
-import { Anchor, Button, Group, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
 import { IconPlugConnected } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useVehicleRequest } from "../../api/fleet";
@@ -30,11 +30,11 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
       <Stack gap={8} miw={0}>
         <Group gap="4px 12px">
           <VehicleBadge isReal={vehicle.is_real} />
-          <Title order={3} lh="inherit">
+          <Text component="h3" lh="inherit">
             <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="block" py={6}>
               {vehicle.name}
             </Anchor>
-          </Title>
+          </Text>
           <VehicleStateBadge vehicle={vehicle} />
         </Group>
         <dl className={`${classes["readings"]} numbers`}>

@@ -1,4 +1,4 @@
-import { Anchor, Button, Group, SimpleGrid, Skeleton, Title } from "@mantine/core";
+import { Anchor, Button, Group, SimpleGrid, Skeleton, Stack, Title } from "@mantine/core";
 import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link, useParams } from "react-router";
@@ -36,7 +36,7 @@ export function VehiclePage() {
 /** Name and state of the vehicle above its panels, with its buttons on the right. */
 function VehicleHead({ vehicle, children }: { vehicle: Vehicle; children?: ReactNode }) {
   return (
-    <Group justify="space-between" gap="6px 14px" mb={14}>
+    <Group justify="space-between" gap="6px 14px">
       <Group gap="6px 14px">
         <Anchor component={Link} to="/vehicles" c="dimmed" display="inline-flex" lh="44px">
           <IconChevronLeft size={20} style={{ alignSelf: "center" }} aria-hidden />
@@ -56,14 +56,14 @@ function VehicleHead({ vehicle, children }: { vehicle: Vehicle; children?: React
 /** A shared simulation: no link, but a calibration and gain history. */
 function SharedView({ vehicle }: { vehicle: Vehicle }) {
   return (
-    <>
+    <Stack gap={14}>
       <VehicleHead vehicle={vehicle} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
+      <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
         <CalibrationHistory vehicleId={vehicle.id} />
         <LedgerTable vehicle={vehicle} />
       </SimpleGrid>
-    </>
+    </Stack>
   );
 }
 
@@ -75,7 +75,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const may = (act: VehicleRequest): boolean => watching === null && vehicle.actions.includes(act);
   const asking = ask.isPending ? ask.variables : null;
   return (
-    <>
+    <Stack gap={14}>
       <VehicleHead vehicle={vehicle}>
         <Button
           component={Link}
@@ -108,7 +108,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
       <ReadOnlyNotice why={watching} />
       <ErrorNotice error={ask.error} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
+      <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
         <LinkPanel vehicle={vehicle} mayEdit={watching === null && vehicle.actions.includes("configure")} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
         <Panel title="Operator">
@@ -145,6 +145,6 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           onRead={() => ask.mutate("parameters")}
         />
       </SimpleGrid>
-    </>
+    </Stack>
   );
 }

@@ -38,13 +38,11 @@ export function AdvancedFields({ form, catalogue }: Props) {
   const { strategy, stop } = form.values.definition;
   const numbers = numbersFor(form.values, catalogue);
   const options = optionsFor(form.values, catalogue);
-  const ofGroup = (wanted: NumberInfo["group"]) =>
-    numbers
-      .filter(({ group }) => group === wanted)
-      .map(({ path, label, isShare, input }) => {
-        const Field = isShare ? ShareField : NumberField;
-        return <Field key={path} label={label} {...input} {...form.getInputProps(path)} />;
-      });
+  const inputs = (infos: readonly NumberInfo[]) =>
+    infos.map(({ path, label, isShare, input }) => {
+      const Field = isShare ? ShareField : NumberField;
+      return <Field key={path} label={label} {...input} {...form.getInputProps(path)} />;
+    });
   return (
     <Stack gap={22}>
       <Group title="Stop rule">
@@ -59,16 +57,16 @@ export function AdvancedFields({ form, catalogue }: Props) {
         <Note fz="small" className={classes["wide"]}>
           {stop.kind === "noise" && strategy === "manual" ? BY_HAND : STOPS[stop.kind].line}
         </Note>
-        {ofGroup("stop")}
+        {inputs(numbers.stop)}
       </Group>
       <Options group={options.strategy} form={form} />
       <Options group={options.experiment} form={form} />
       <Group title="Bounds and steps">
         <BoundFields form={form} catalogue={catalogue} />
-        {ofGroup("steps")}
+        {inputs(numbers.steps)}
       </Group>
       <Options group={options.vehicle} form={form} />
-      {numbers.some(({ group }) => group === "seed") && <Group title="Random seed">{ofGroup("seed")}</Group>}
+      {numbers.seed.length > 0 && <Group title="Random seed">{inputs(numbers.seed)}</Group>}
     </Stack>
   );
 }

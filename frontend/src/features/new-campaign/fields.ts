@@ -8,7 +8,6 @@ import { type CampaignForm, experimentOf, gainsOf } from "./newCampaign";
 export interface NumberInfo {
   path: string;
   label: string;
-  group: "stop" | "steps" | "seed";
   isShare?: true;
   input?: Pick<NumberFieldProps, "description" | "placeholder" | "rightSection" | "whole">;
   /** Where the field is shown; everywhere without it. */
@@ -27,66 +26,67 @@ function isSeeded({ vehicle }: CampaignForm, catalogue: Catalogue): boolean {
   );
 }
 
-const NUMBERS: readonly NumberInfo[] = [
-  { group: "stop", path: "definition.stop.max_flights", label: "Maximum flights", input: { whole: true } },
-  {
-    group: "stop",
-    path: "definition.stop.improvement",
-    label: "Improvement threshold",
-    isShare: true,
-    isShown: ({ definition }) => definition.stop.kind === "paper",
-  },
-  {
-    group: "stop",
-    path: "definition.stop.confidence",
-    label: "Confidence",
-    isShare: true,
-    isShown: ({ definition }) => definition.stop.kind === "noise",
-  },
-  {
-    group: "stop",
-    path: "definition.stop.min_battery_v",
-    label: "Minimum battery voltage",
-    input: { placeholder: "No limit", rightSection: "V" },
-    isShown: isAltitude,
-  },
-  {
-    group: "steps",
-    path: "definition.first_step_fraction",
-    label: "Maximum first step",
-    isShare: true,
-    input: { description: "Fraction of each gain's range, until the first valid flight" },
-  },
-  {
-    group: "steps",
-    path: "definition.step_fraction",
-    label: "Maximum later step",
-    isShare: true,
-    input: { description: "Fraction of each gain's range, after that" },
-  },
-  {
-    group: "steps",
-    path: "definition.ceiling_m",
-    label: "Gate ceiling",
-    input: {
-      description: "Gains that could take the vehicle above this altitude are refused",
-      rightSection: "m",
+const NUMBERS: Readonly<Record<"stop" | "steps" | "seed", readonly NumberInfo[]>> = {
+  stop: [
+    { path: "definition.stop.max_flights", label: "Maximum flights", input: { whole: true } },
+    {
+      path: "definition.stop.improvement",
+      label: "Improvement threshold",
+      isShare: true,
+      isShown: ({ definition }) => definition.stop.kind === "paper",
     },
-    isShown: (form, catalogue) =>
-      isAltitude(form, catalogue) && experimentOf(catalogue, form.definition.experiment)?.has_model === true,
-  },
-  {
-    group: "seed",
-    path: "definition.seed",
-    label: "Seed",
-    input: { description: "The same seed reproduces the same scatter", whole: true },
-    isShown: isSeeded,
-  },
-];
+    {
+      path: "definition.stop.confidence",
+      label: "Confidence",
+      isShare: true,
+      isShown: ({ definition }) => definition.stop.kind === "noise",
+    },
+    {
+      path: "definition.stop.min_battery_v",
+      label: "Minimum battery voltage",
+      input: { placeholder: "No limit", rightSection: "V" },
+      isShown: isAltitude,
+    },
+  ],
+  steps: [
+    {
+      path: "definition.first_step_fraction",
+      label: "Maximum first step",
+      isShare: true,
+      input: { description: "Fraction of each gain's range, until the first valid flight" },
+    },
+    {
+      path: "definition.step_fraction",
+      label: "Maximum later step",
+      isShare: true,
+      input: { description: "Fraction of each gain's range, after that" },
+    },
+    {
+      path: "definition.ceiling_m",
+      label: "Gate ceiling",
+      input: {
+        description: "Gains that could take the vehicle above this altitude are refused",
+        rightSection: "m",
+      },
+      isShown: (form, catalogue) =>
+        isAltitude(form, catalogue) && experimentOf(catalogue, form.definition.experiment)?.has_model === true,
+    },
+  ],
+  seed: [
+    {
+      path: "definition.seed",
+      label: "Seed",
+      input: { description: "The same seed reproduces the same scatter", whole: true },
+      isShown: isSeeded,
+    },
+  ],
+};
 
-/** The advanced number fields that this form shows. */
-export function numbersFor(form: CampaignForm, catalogue: Catalogue): NumberInfo[] {
-  return NUMBERS.filter(({ isShown }) => isShown?.(form, catalogue) ?? true);
+/** The advanced number fields that this form shows, by their groups. */
+export function numbersFor(form: CampaignForm, catalogue: Catalogue) {
+  const shown = (group: keyof typeof NUMBERS): NumberInfo[] =>
+    NUMBERS[group].filter(({ isShown }) => isShown?.(form, catalogue) ?? true);
+  return { stop: shown("stop"), steps: shown("steps"), seed: shown("seed") };
 }
 
 export interface OptionGroup {
@@ -131,6 +131,7 @@ type Labels = Record<string, string>;
 export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: Labels; advanced: Labels } {
   const { start, experiment } = form.definition;
   const gains = gainsOf(catalogue, experiment).map(({ name }) => name);
+  const numbers = Object.values(numbersFor(form, catalogue)).flat();
   const options = optionsFor(form, catalogue);
   const titled = ({ path, options }: OptionGroup): Labels =>
     Object.fromEntries(options.map(({ name, title }) => [`${path}.${name}`, title]));
@@ -147,7 +148,7 @@ export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: Lab
       ...(start.kind === "campaign" ? { "definition.start.donor": "Campaign" } : {}),
     },
     advanced: {
-      ...Object.fromEntries(numbersFor(form, catalogue).map(({ path, label }) => [path, label])),
+      ...Object.fromEntries(numbers.map(({ path, label }) => [path, label])),
       ...titled(options.strategy),
       ...titled(options.experiment),
       ...Object.fromEntries(gains.map((name) => [`definition.bounds.${name}`, `bounds of ${name}`])),
@@ -174,7 +175,7 @@ export function unreadable(form: CampaignForm, read: (path: string) => unknown, 
   const { start, experiment } = form.definition;
   const gains = gainsOf(catalogue, experiment).map(({ name }) => name);
   const numbers: { path: string; label: string }[] = [
-    ...numbersFor(form, catalogue),
+    ...Object.values(numbersFor(form, catalogue)).flat(),
     ...gains.flatMap((name) => [
       { path: `definition.bounds.${name}.0`, label: `${name} minimum` },
       { path: `definition.bounds.${name}.1`, label: `${name} maximum` },

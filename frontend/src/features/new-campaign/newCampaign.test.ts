@@ -117,11 +117,6 @@ test("bounds are sent only where they are tighter", () => {
   expect(requestFrom(form, catalogue).definition?.bounds).toEqual({ kp: [0, 2000] });
 });
 
-test("given start gains leave out what is empty, so that the server names it", () => {
-  const form = defined({ start: { kind: "given", gains: { kp: 400, ki: "", kd: -1 }, donor: null } });
-  expect(requestFrom(form, catalogue).definition?.start).toEqual({ kind: "given", gains: { kp: 400, kd: -1 } });
-});
-
 test("a wrong number is sent as it is, for the server to refuse, and an empty field has the server's default", () => {
   const form = stopping({ max_flights: -3, improvement: "", min_battery_v: 10.8 });
   expect(requestFrom(form, catalogue).definition?.stop).toEqual({

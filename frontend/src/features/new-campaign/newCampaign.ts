@@ -6,6 +6,7 @@
 import type {
   CampaignSummary,
   Catalogue,
+  Definition,
   Gain,
   NewCampaign,
   PresetInfo,
@@ -14,33 +15,23 @@ import type {
 } from "../../api/types";
 import { type NumberEntry, numbersOf, type OptionValue } from "../../ui/Fields";
 
-export type StartKind = "default" | "simplex" | "given" | "campaign";
-export type StopKind = "noise" | "paper" | "budget";
-type Options = Record<string, OptionValue>;
+export type StartKind = Definition["start"]["kind"];
+export type StopKind = Definition["stop"]["kind"];
+
+/** These settings with text in their number fields. */
+type Entered<Settings> = {
+  [Name in keyof Settings]: Settings[Name] extends number | null ? NumberEntry : Settings[Name];
+};
 
 export interface CampaignForm {
   name: string;
   /** The vehicle, if it is a registered one. */
   registered: Vehicle | null;
-  vehicle: { kind: string; options: Options };
-  definition: {
-    experiment: string;
-    experiment_options: Options;
-    strategy: string;
-    options: Options;
+  vehicle: { kind: string; options: Record<string, OptionValue> };
+  definition: Entered<Omit<Definition, "start" | "stop" | "bounds">> & {
     start: { kind: StartKind; gains: Record<string, NumberEntry>; donor: CampaignSummary | null };
-    stop: {
-      kind: StopKind;
-      max_flights: NumberEntry;
-      improvement: NumberEntry;
-      confidence: NumberEntry;
-      min_battery_v: NumberEntry;
-    };
+    stop: Entered<Definition["stop"]>;
     bounds: Record<string, [NumberEntry, NumberEntry]>;
-    first_step_fraction: NumberEntry;
-    step_fraction: NumberEntry;
-    ceiling_m: NumberEntry;
-    seed: NumberEntry;
   };
 }
 

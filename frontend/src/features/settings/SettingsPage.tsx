@@ -44,7 +44,7 @@ export function SettingsPage() {
       <Title order={1} mb={14}>
         Settings
       </Title>
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)">
+      <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
         <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
           <Panel title="This browser">
             <ThisBrowser />
@@ -58,7 +58,15 @@ export function SettingsPage() {
           </div>
         ) : (
           <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
-            <RemoteAccess system={system.data} />
+            <Panel title="Open on a tablet">
+              <Stack gap={18}>
+                {system.data.addresses.length > 0 ? (
+                  <Reachable system={system.data} />
+                ) : (
+                  <LocalOnly system={system.data} />
+                )}
+              </Stack>
+            </Panel>
             <Backup system={system.data} />
           </Stack>
         )}
@@ -180,16 +188,6 @@ function Backup({ system }: { system: System }) {
 }
 
 /** How to open this dashboard on another device, and the security consequences. */
-function RemoteAccess({ system }: { system: System }) {
-  return (
-    <Panel title="Open on a tablet">
-      <Stack gap={18}>
-        {system.addresses.length > 0 ? <Reachable system={system} /> : <LocalOnly system={system} />}
-      </Stack>
-    </Panel>
-  );
-}
-
 function Reachable({ system: { addresses, exposes, host, in_container } }: { system: System }) {
   const urls = addresses.map(({ url }) => url);
   const [chosen, setChosen] = useState(urls[0] ?? "");
@@ -227,6 +225,7 @@ function Reachable({ system: { addresses, exposes, host, in_container } }: { sys
   );
 }
 
+/** Why no other device can open it. */
 function LocalOnly({ system: { exposes, host, is_exposed } }: { system: System }) {
   if (is_exposed) {
     return <Note>The server listens on {host}, but this computer is not connected to a network.</Note>;
