@@ -23,17 +23,6 @@ import { useVehicleChanged } from "./vehicles";
 
 const SHOWN = 20;
 
-interface PageQuery {
-  limit: number;
-  cursor?: string;
-}
-
-interface PageOf<Item> {
-  items: Item[];
-  total: number;
-  next_cursor: string | null;
-}
-
 export function useRegisterVehicle() {
   const changed = useVehicleChanged();
   return useMutation({
@@ -42,13 +31,22 @@ export function useRegisterVehicle() {
   });
 }
 
-export function useEditVehicle(vehicleId: number) {
+interface ToVehicle {
+  path: { vehicle_id: number };
+  headers: ReturnType<typeof controlHeader>;
+}
+
+/** A request to a vehicle, after which everything about it is read again. */
+function useRequest<Sent, Answer>(vehicleId: number, send: (sent: Sent, to: ToVehicle) => Promise<Answer>) {
   const changed = useVehicleChanged();
   return useMutation({
-    mutationFn: (body: VehicleEdit) =>
-      answer(editVehicle({ path: { vehicle_id: vehicleId }, body, headers: controlHeader(vehicleId) })),
+    mutationFn: (sent: Sent) => send(sent, { path: { vehicle_id: vehicleId }, headers: controlHeader(vehicleId) }),
     onSettled: () => changed(vehicleId),
   });
+}
+
+export function useEditVehicle(vehicleId: number) {
+  return useRequest(vehicleId, (body: VehicleEdit, to) => answer(editVehicle({ ...to, body })));
 }
 
 /** Delete the vehicle as it was read; `onDeleted` is called even if its page is gone by then. */
@@ -63,14 +61,7 @@ export function useDeleteVehicle({ id, version }: Vehicle, onDeleted: () => void
 }
 
 export function useRelease(vehicleId: number) {
-  const changed = useVehicleChanged();
-  return useMutation({
-    mutationFn: (statement: string) =>
-      answer(
-        releaseVehicle({ path: { vehicle_id: vehicleId }, body: { statement }, headers: controlHeader(vehicleId) }),
-      ),
-    onSettled: () => changed(vehicleId),
-  });
+  return useRequest(vehicleId, (statement: string, to) => answer(releaseVehicle({ ...to, body: { statement } })));
 }
 
 const ACTS = {
@@ -85,16 +76,15 @@ export type VehicleRequest = keyof typeof ACTS;
 
 /** Send a request to a vehicle; its outcome appears in the list of acts. */
 export function useVehicleRequest(vehicleId: number) {
-  const changed = useVehicleChanged();
-  return useMutation({
-    mutationFn: (act: VehicleRequest) =>
-      answer(ACTS[act]({ path: { vehicle_id: vehicleId }, headers: controlHeader(vehicleId) })),
-    onSettled: () => changed(vehicleId),
-  });
+  return useRequest(vehicleId, (act: VehicleRequest, to) => answer(ACTS[act](to)));
 }
 
 /** A paged list, newest first. */
-function useNewest<Item>(vehicleId: number, list: string, read: (query: PageQuery) => Promise<PageOf<Item>>) {
+function useNewest<Page extends { next_cursor: string | null }>(
+  vehicleId: number,
+  list: string,
+  read: (query: { limit: number; cursor?: string }) => Promise<Page>,
+) {
   return useInfiniteQuery({
     queryKey: ["vehicle", vehicleId, list],
     queryFn: ({ pageParam }) => read({ limit: SHOWN, ...(pageParam === null ? {} : { cursor: pageParam }) }),

@@ -8,7 +8,6 @@ import {
   problemOf,
   reasonsByField,
   retries,
-  standingProblem,
 } from "./problems";
 
 const refused = problemFrom(422, {
@@ -36,6 +35,11 @@ test("a reason finds the input it belongs to, the most precise one first", () =>
 
 test("a reason without an input is still shown", () => {
   expect(otherProblems(refused, ["kp"])).toEqual([{ field: "definition.stop.max_flights", reason: "must be 1 … 200" }]);
+});
+
+test("a refusal that names no field stays", () => {
+  const conflict = problemFrom(409, { type: "urn:gainline:conflict", title: "Conflict" });
+  expect(formProblem(new ApiError(conflict), { name: "Name" }, {})?.title).toBe("Not possible now");
 });
 
 test("a server that is away is told apart from a refusal", () => {
@@ -67,28 +71,6 @@ test("reasons stay in their order, and sentences are joined by a space", () => {
   expect(reasonsByField(problem, ["ki"])["ki"]).toBe("The step is too large. The vehicle can be stuck on the ground.");
 });
 
-test("a refusal of a form leaves a field that is edited, and ends with the last of them", () => {
-  const sent = { name: "", definition: { stop: { max_flights: 0 } } };
-  const error = new ApiError(
-    problemFrom(422, {
-      problems: [
-        { field: "name", reason: "must not be empty" },
-        { field: "definition.stop.max_flights", reason: "must be at least 1, got 0" },
-      ],
-    }),
-  );
-  const fieldsAfter = (current: unknown) =>
-    standingProblem(error, sent, current)?.problems.map(({ field }) => field) ?? null;
-  expect(fieldsAfter(sent)).toEqual(["name", "definition.stop.max_flights"]);
-  expect(fieldsAfter({ ...sent, name: "Drone 7" })).toEqual(["definition.stop.max_flights"]);
-  expect(fieldsAfter({ name: "Drone 7", definition: { stop: { max_flights: 7 } } })).toBeNull();
-});
-
-test("a refusal that names no field stays", () => {
-  const error = new ApiError(problemFrom(409, { type: "urn:gainline:conflict", title: "Conflict" }));
-  expect(standingProblem(error, { name: "a" }, { name: "b" })?.title).toBe("Not possible now");
-});
-
 test("a reason about a share is given in percent", () => {
   expect(inPercent("must be below 1, got 1.01")).toBe("must be below 100\u00a0%, got 101\u00a0%");
   expect(inPercent("must be above 0 and at most 0.5, got -0.07")).toBe(
@@ -96,7 +78,7 @@ test("a reason about a share is given in percent", () => {
   );
 });
 
-test("a form names the marked fields by their labels, not in the words of the API", () => {
+test("a form names the fields that are still marked by their labels, not in the words of the API", () => {
   const labels = { name: "Name", "stop.max_flights": "Maximum flights", "gains.kp": "kp" };
   expect(formProblem(refused, labels)).toMatchObject({
     title: "Correct the marked fields: Maximum flights, kp.",
@@ -105,4 +87,6 @@ test("a form names the marked fields by their labels, not in the words of the AP
     problems: refused.problems,
   });
   expect(formProblem(refused, { "gains.kp": "kp" })).toBe(refused);
+  expect(formProblem(refused, labels, { "gains.kp": "too low" })?.title).toBe("Correct the marked field: kp.");
+  expect(formProblem(refused, labels, {})).toBeNull();
 });

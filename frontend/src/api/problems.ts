@@ -53,13 +53,17 @@ function text(value: unknown): string {
   return typeof value === "string" ? value : "";
 }
 
+function record(value: unknown): Record<string, unknown> {
+  return typeof value === "object" && value !== null ? (value as Record<string, unknown>) : {};
+}
+
 function fieldProblems(value: unknown): FieldProblem[] {
   if (!Array.isArray(value)) return [];
-  return value.flatMap((entry: unknown) => {
-    if (typeof entry !== "object" || entry === null) return [];
-    const { field, reason } = entry as Record<string, unknown>;
-    return typeof field === "string" && typeof reason === "string" ? [{ field, reason }] : [];
-  });
+  return value
+    .map(record)
+    .flatMap(({ field, reason }) =>
+      typeof field === "string" && typeof reason === "string" ? [{ field, reason }] : [],
+    );
 }
 
 /** The page's words where the API's title is the term of its protocol, by the type of the error or its status. */
@@ -71,7 +75,7 @@ const TITLES: Readonly<Record<string, string>> = {
 /** Convert the response of a failed request to a problem. */
 export function problemFrom(status: number | undefined, body: unknown): Problem {
   if (status === undefined) return UNREACHABLE;
-  const found = (typeof body === "object" && body !== null ? body : {}) as Record<string, unknown>;
+  const found = record(body);
   return {
     status,
     title:
@@ -95,37 +99,25 @@ export function problemOf(error: unknown): Problem | null {
   return { ...UNREACHABLE, title: error instanceof Error ? error.message : UNREACHABLE.title };
 }
 
-/** Reason per field. A refused field may have any prefix (`body.definition.bounds.kp`). */
+/** The one of `fields` that a refused field is, or is part of. It may have any prefix (`body.definition.bounds.kp`). */
+function ownerOf({ field }: FieldProblem, fields: readonly string[]): string | undefined {
+  const owners = fields.filter((name) => `.${field}.`.includes(`.${name}.`));
+  return owners.sort((one, other) => other.length - one.length)[0];
+}
+
+/** Reason per field. */
 export function reasonsByField(problem: Problem | null, fields: readonly string[]): Record<string, string> {
   const reasons: Record<string, string> = {};
-  for (const { field, reason } of problem?.problems ?? []) {
-    const owner = fields
-      .filter((name) => field === name || field.endsWith(`.${name}`) || `.${field}.`.includes(`.${name}.`))
-      .sort((one, other) => other.length - one.length)[0];
-    if (owner !== undefined) reasons[owner] = reasons[owner] ? joined(reasons[owner], reason) : reason;
+  for (const refused of problem?.problems ?? []) {
+    const owner = ownerOf(refused, fields);
+    if (owner !== undefined) reasons[owner] = reasons[owner] ? joined(reasons[owner], refused.reason) : refused.reason;
   }
   return reasons;
 }
 
-function valueAt(request: unknown, path: readonly string[]): unknown {
-  return path.reduce<unknown>(
-    (part, name) => (typeof part === "object" && part !== null ? (part as Record<string, unknown>)[name] : undefined),
-    request,
-  );
-}
-
-/** Refusal of a form's request without the fields that have been edited since; null once all of them have. */
-export function standingProblem(error: unknown, sent: unknown, current: unknown): Problem | null {
-  const problem = problemOf(error);
-  if (problem === null || problem.problems.length === 0) return problem;
-  const written = (request: unknown, field: string) => JSON.stringify(valueAt(request, field.split(".")));
-  const problems = problem.problems.filter(({ field }) => written(sent, field) === written(current, field));
-  return problems.length === 0 ? null : { ...problem, problems };
-}
-
 /** A reason about a share, in percent: `must be below 1, got 1.01` as `must be below 100 %, got 101 %`. */
-export function inPercent(reason: string | undefined): string | undefined {
-  return reason?.replace(/[-−]?\d+(?:\.\d+)?/g, (share) => {
+export function inPercent(reason: string): string {
+  return reason.replace(/[-−]?\d+(?:\.\d+)?/g, (share) => {
     const percent = Number((100 * Number(share.replace("−", "-"))).toPrecision(12));
     return `${percent}\u00a0%`.replace("-", "−");
   });
@@ -138,20 +130,23 @@ function joined(one: string, other: string): string {
 
 /** Refused fields that are not among `fields`. */
 export function otherProblems(problem: Problem | null, fields: readonly string[]): FieldProblem[] {
-  return (problem?.problems ?? []).filter(
-    (one) => Object.keys(reasonsByField({ ...UNREACHABLE, problems: [one] }, fields)).length === 0,
-  );
+  return (problem?.problems ?? []).filter((refused) => ownerOf(refused, fields) === undefined);
 }
 
-/** A form's refusal in the form's own words where every reason is shown at a field of `labels`; otherwise as it is. */
-export function formProblem(error: unknown, labels: Readonly<Record<string, string>>): Problem | null {
+/**
+ * A form's refusal in the form's own words where every reason is shown at a field of `labels`; otherwise as it is. Names
+ * the fields at which a reason still stands; null once all of them have been edited.
+ */
+export function formProblem(
+  error: unknown,
+  labels: Readonly<Record<string, string>>,
+  standing: Readonly<Record<string, unknown>> = reasonsByField(problemOf(error), Object.keys(labels)),
+): Problem | null {
   const problem = problemOf(error);
-  if (problem === null || problem.problems.length === 0) return problem;
   const fields = Object.keys(labels);
-  if (otherProblems(problem, fields).length > 0) return problem;
-  const reasons = reasonsByField(problem, fields);
-  const marked = fields.filter((field) => reasons[field] !== undefined).map((field) => labels[field]);
-  const names = [...new Set(marked)];
+  if (problem === null || problem.problems.length === 0 || otherProblems(problem, fields).length > 0) return problem;
+  const names = [...new Set(fields.filter((field) => field in standing).map((field) => labels[field]))];
+  if (names.length === 0) return null;
   const title = `Correct the marked ${names.length === 1 ? "field" : "fields"}: ${names.join(", ")}.`;
   return { ...problem, title, detail: "", hint: "" };
 }

@@ -37,6 +37,7 @@ export type {
   Trouble,
   Vehicle,
   VehicleAct,
+  VehicleEdit,
   VehicleKindInfo,
   VehicleState,
 } from "./generated";

@@ -1,33 +1,32 @@
 import { Checkbox, InputBase, type InputBaseProps, TextInput, type TextInputProps } from "@mantine/core";
 import { IconChevronDown } from "@tabler/icons-react";
 import { useState } from "react";
+import { inPercent } from "../api/problems";
 import type { OptionInfo } from "../api/types";
 import { readNumber, stopped, typed, unitAfter } from "./format";
 
 /** A number, or text that is not a number yet. */
 export type NumberEntry = number | string;
 
-interface Props extends Omit<TextInputProps, "value" | "onChange"> {
-  value: NumberEntry;
+export interface NumberFieldProps extends Omit<TextInputProps, "value" | "onChange"> {
+  value?: NumberEntry;
   onChange: (value: NumberEntry) => void;
-  suffix?: string;
   /** Value of an empty field; without it the field must be filled. */
   empty?: number;
   /** Whether only whole numbers are valid. */
-  whole?: boolean;
+  whole?: boolean | undefined;
 }
 
 /** Number input. Passes on valid input as a number and anything else as text, with an error message. */
 export function NumberField({
-  value,
+  value = "",
   onChange,
-  suffix,
   empty,
   error,
   required = false,
   whole = false,
   ...props
-}: Props) {
+}: NumberFieldProps) {
   const written = typeof value === "number" ? typed(value) : value;
   const [text, setText] = useState(written);
   const meant = (typing: string): NumberEntry =>
@@ -41,7 +40,6 @@ export function NumberField({
       placeholder={empty === undefined ? undefined : typed(empty)}
       value={shown}
       error={wrong ?? (typeof error === "string" ? stopped(error) : error)}
-      rightSection={suffix?.trim()}
       onChange={(event) => {
         setText(event.currentTarget.value);
         onChange(meant(event.currentTarget.value));
@@ -51,12 +49,37 @@ export function NumberField({
   );
 }
 
+/** The entry times a factor, if it is a number. */
+export function scaled(entry: NumberEntry, factor: number): NumberEntry {
+  return typeof entry === "number" ? Number((factor * entry).toPrecision(12)) : entry;
+}
+
+/** Input of a share in percent. */
+export function ShareField({ value = "", onChange, error, ...props }: NumberFieldProps) {
+  return (
+    <NumberField
+      rightSection="%"
+      value={scaled(value, 100)}
+      error={typeof error === "string" ? inPercent(error) : error}
+      onChange={(percent) => onChange(scaled(percent, 0.01))}
+      {...props}
+    />
+  );
+}
+
+/** The entries that are numbers. */
+export function numbersOf(entries: Readonly<Record<string, NumberEntry>>): Record<string, number> {
+  return Object.fromEntries(
+    Object.entries(entries).filter((entry): entry is [string, number] => typeof entry[1] === "number"),
+  );
+}
+
 export type OptionValue = boolean | number | string;
 
 interface OptionFieldProps {
   option: OptionInfo;
-  value: OptionValue | undefined;
-  error: string | undefined;
+  value?: OptionValue;
+  error?: TextInputProps["error"];
   onChange: (value: OptionValue) => void;
 }
 
@@ -68,69 +91,61 @@ function rangeOf({ lower = null, upper = null, unit = "" }: OptionInfo): string 
 
 const CHOICES: Readonly<Record<string, string>> = { mocap: "Motion capture" };
 
-function shown(choice: OptionValue): string {
-  return CHOICES[String(choice)] ?? String(choice).replace(/^./, (letter) => letter.toUpperCase());
-}
-
 /** Input for an option, by its type: checkbox, select, text, or number with its range. */
-export function OptionField({ option, value, error, onChange }: OptionFieldProps) {
-  const { title, default: standard, choices = [] } = option;
+export function OptionField({ option, value, onChange, ...props }: OptionFieldProps) {
+  const { title, default: standard, choices } = option;
+  const field = { label: title, ...props };
   const now = value ?? standard;
   if (typeof standard === "boolean") {
     return (
       <Checkbox
         size="md"
-        label={title}
         checked={now === true}
-        error={error}
         onChange={(event) => onChange(event.currentTarget.checked)}
+        {...field}
       />
     );
   }
   if (choices.length > 0) {
+    const data = choices.map(String).map((choice) => ({
+      value: choice,
+      label: CHOICES[choice] ?? choice.replace(/^./, (letter) => letter.toUpperCase()),
+    }));
     return (
       <SelectField
-        label={title}
-        data={choices.map((choice) => ({ value: String(choice), label: shown(choice) }))}
+        data={data}
         value={String(now)}
-        error={error}
         onChange={(chosen) => onChange(choices.find((choice) => String(choice) === chosen) ?? standard)}
+        {...field}
       />
     );
   }
   if (typeof standard === "string") {
     return (
       <TextInput
-        label={title}
         value={String(now)}
-        error={error}
         autoCapitalize="off"
         spellCheck={false}
         onChange={(event) => onChange(event.currentTarget.value)}
+        {...field}
       />
     );
   }
   return (
     <NumberField
-      label={title}
       description={rangeOf(option)}
       value={typeof now === "boolean" ? "" : now}
-      error={error}
       onChange={onChange}
       empty={standard}
+      {...field}
     />
   );
 }
 
-interface Option<Value extends string = string> {
-  value: Value;
-  label: string;
-}
-
 interface SelectFieldProps<Value extends string> extends InputBaseProps {
   "aria-label"?: string;
-  data: readonly Option<Value>[];
-  value: Value;
+  data: readonly { value: Value; label: string }[];
+  value?: NoInfer<Value>;
   onChange: (value: Value) => void;
 }
 

@@ -1,6 +1,10 @@
-import { Box, Skeleton, Title, UnstyledButton } from "@mantine/core";
+import { Box, SimpleGrid, Skeleton, Stack, Text, Title, UnstyledButton } from "@mantine/core";
+import type { GetInputPropsReturnType, UseFormReturnType } from "@mantine/form";
 import { IconChevronDown } from "@tabler/icons-react";
+import type { UseMutationResult } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";
+import { flushSync } from "react-dom";
+import { formProblem, problemOf, reasonsByField } from "../api/problems";
 import type { Gain } from "../api/types";
 import { type NumberEntry, NumberField } from "./Fields";
 import classes from "./Form.module.css";
@@ -17,7 +21,7 @@ interface Props {
 /** A page with one form, while what the form needs is loaded, and after. */
 export function FormPage({ title, error, isPending, children }: Props) {
   return (
-    <Box maw={860} mx="auto">
+    <Box maw={860} mx="auto" style={{ containerType: "inline-size" }}>
       <Title order={1} mt={4} mb={16}>
         {title}
       </Title>
@@ -28,11 +32,48 @@ export function FormPage({ title, error, isPending, children }: Props) {
   );
 }
 
+interface RequestFormProps<Values, Request, Answer> {
+  form: UseFormReturnType<Values, Request>;
+  /** Labels of the fields, by the names that the form and the server have for them. */
+  labels: Readonly<Record<string, string>>;
+  request: UseMutationResult<Answer, Error, Request>;
+  onDone: (answer: Answer) => void;
+  /** The buttons, below the notice. */
+  actions: ReactNode;
+  children: ReactNode;
+}
+
+/** A form that is sent as one request. Reasons of a refusal stand at their fields until these are edited; the first of
+ * them gets the focus. */
+export function RequestForm<Values, Request, Answer>({
+  form,
+  labels,
+  request,
+  onDone,
+  actions,
+  children,
+}: RequestFormProps<Values, Request, Answer>) {
+  const fields = Object.keys(labels);
+  const refuse = (error: Error): void => {
+    flushSync(() => form.setErrors(reasonsByField(problemOf(error), fields)));
+    document.querySelector<HTMLElement>('main [aria-invalid="true"]')?.focus();
+  };
+  return (
+    <form noValidate onSubmit={form.onSubmit((sent) => request.mutate(sent, { onSuccess: onDone, onError: refuse }))}>
+      <Stack gap={18}>
+        {children}
+        <ErrorNotice error={formProblem(request.error, labels, form.errors)} shown={fields} />
+        {actions}
+      </Stack>
+    </form>
+  );
+}
+
 /** What blocks the form, beside its button: texts that are missing, and fields without a valid number. */
 export function MissingEntries({ numbers, texts = [] }: { numbers: readonly string[]; texts?: readonly string[] }) {
   if (numbers.length + texts.length === 0) return null;
   return (
-    <p role="status" className={classes["missing"]}>
+    <p role="status">
       {[...texts, ...(numbers.length > 0 ? [`Enter a valid number for ${numbers.join(", ")}.`] : [])].join(" ")}
     </p>
   );
@@ -55,12 +96,14 @@ export function FoldedSection({ title, forcedOpen, children }: FoldedSectionProp
         <IconChevronDown size={18} aria-hidden />
         {title}
       </UnstyledButton>
-      <div hidden={!isOpen}>{children}</div>
+      <Box hidden={!isOpen} p="5px 16px 16px">
+        {children}
+      </Box>
     </div>
   );
 }
 
-function outOfRange(value: NumberEntry | undefined, lower: number, upper: number): string | undefined {
+function outOfRange(value: NumberEntry, { lower, upper }: Gain): string | undefined {
   const isInside = typeof value !== "number" || (lower <= value && value <= upper);
   return isInside ? undefined : `Enter a number from ${lower} to ${upper}.`;
 }
@@ -68,31 +111,36 @@ function outOfRange(value: NumberEntry | undefined, lower: number, upper: number
 interface GainFieldsProps {
   legend: string;
   gains: readonly Gain[];
-  values: Readonly<Record<string, NumberEntry>>;
-  /** Refusals by field name, which is `prefix` and the gain's name. */
-  reasons: Readonly<Record<string, string>>;
-  prefix: string;
-  onChange: (values: Record<string, NumberEntry>) => void;
+  /** Props of a gain's input, by the gain's name. */
+  input: (name: string) => GetInputPropsReturnType;
 }
 
 /** A required number for each gain, with its range. */
-export function GainFields({ legend, gains, values, reasons, prefix, onChange }: GainFieldsProps) {
+export function GainFields({ legend, gains, input }: GainFieldsProps) {
   return (
-    <fieldset className={classes["gains"]}>
-      <legend>{legend}</legend>
-      {gains.map(({ name, lower, upper, unit, integer }) => (
-        <NumberField
-          key={name}
-          required
-          withAsterisk={false}
-          label={name}
-          description={`${lower} … ${upper}${unitAfter(unit)}`}
-          value={values[name] ?? ""}
-          whole={integer}
-          error={reasons[`${prefix}.${name}`] ?? outOfRange(values[name], lower, upper)}
-          onChange={(value) => onChange({ ...values, [name]: value })}
-        />
-      ))}
+    <fieldset>
+      <Text component="legend" fw={550} mb={4}>
+        {legend}
+      </Text>
+      <SimpleGrid minColWidth={120} autoFlow="auto-fit" spacing={12}>
+        {gains.map((gain) => {
+          const { value = "", onChange, error, ...props } = input(gain.name);
+          return (
+            <NumberField
+              key={gain.name}
+              required
+              withAsterisk={false}
+              label={gain.name}
+              description={`${gain.lower} … ${gain.upper}${unitAfter(gain.unit)}`}
+              whole={gain.integer}
+              value={value}
+              error={error ?? outOfRange(value, gain)}
+              onChange={onChange}
+              {...props}
+            />
+          );
+        })}
+      </SimpleGrid>
     </fieldset>
   );
 }

@@ -1,3 +1,4 @@
+import { Text } from "@mantine/core";
 import type { ReactNode } from "react";
 import type { Topic } from "./explanations";
 import { HelpTip } from "./HelpTip";
@@ -12,12 +13,15 @@ interface Props {
 
 /** One reading with its name; stale readings are grey. */
 export function LabelledValue({ title, value, topic, bad = false, stale = false }: Props) {
+  const color = bad ? "var(--bad)" : "var(--ink)";
   return (
-    <div data-bad={bad || undefined} data-stale={stale || undefined}>
-      <dt>
+    <div>
+      <Text component="dt" c="dimmed" fz="small">
         {title} {topic && <HelpTip topic={topic} />}
-      </dt>
-      <dd>{value}</dd>
+      </Text>
+      <Text component="dd" c={stale ? "dimmed" : color} fw={stale ? 550 : 650} fz="strong">
+        {value}
+      </Text>
     </div>
   );
 }

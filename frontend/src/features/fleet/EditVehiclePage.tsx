@@ -1,16 +1,16 @@
 import { Button, Group } from "@mantine/core";
+import { useForm } from "@mantine/form";
 import { useState } from "react";
 import { Link, Navigate, useNavigate, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useDeleteVehicle, useEditVehicle } from "../../api/fleet";
-import { reasonsByField, standingProblem } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
-import type { Catalogue, Vehicle } from "../../api/types";
+import type { Catalogue, Vehicle, VehicleEdit } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
-import classes from "../../ui/Form.module.css";
-import { FormPage } from "../../ui/FormPage";
-import { ErrorNotice, FormErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
+import { FormPage, RequestForm } from "../../ui/FormPage";
+import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
+import { autopilotOf } from "./fleet";
 import { AddressField, FurtherFields, furtherLabels, NameField, PLAIN_LABELS } from "./VehicleFields";
 
 /** Name and settings of a disconnected vehicle; of any other its own page is shown, and of a deleted one the list. */
@@ -34,47 +34,40 @@ export function EditVehiclePage() {
 }
 
 function EditForm({ vehicle, catalogue }: { vehicle: Vehicle; catalogue: Catalogue }) {
-  const [{ version, name, options }, setForm] = useState(vehicle);
+  const { version, name, options } = vehicle;
+  const form = useForm({
+    initialValues: { version, name, options },
+    transformValues: (values): VehicleEdit => ({ ...values, name: values.name.trim() }),
+  });
   const navigate = useNavigate();
   const edit = useEditVehicle(vehicle.id);
-  const request = { version, name: name.trim(), options };
-  const labels = { ...PLAIN_LABELS, ...furtherLabels(catalogue) };
-  const problem = standingProblem(edit.error, edit.variables, request);
-  const reasons = reasonsByField(problem, Object.keys(labels));
-  const set = (change: Partial<Vehicle>): void => setForm((form) => ({ ...form, ...change }));
   return (
-    <form
-      noValidate
-      className={classes["form"]}
-      onSubmit={(event) => {
-        event.preventDefault();
-        edit.mutate(request, { onSuccess: () => void navigate(`/vehicles/${vehicle.id}`) });
-      }}
+    <RequestForm
+      form={form}
+      labels={{ ...PLAIN_LABELS, ...furtherLabels(catalogue) }}
+      request={edit}
+      onDone={() => void navigate(`/vehicles/${vehicle.id}`)}
+      actions={
+        <Group>
+          <DeleteVehicle vehicle={vehicle} />
+          <Button component={Link} to={`/vehicles/${vehicle.id}`} variant="default" ms="auto">
+            Cancel
+          </Button>
+          <Button type="submit" loading={edit.isPending}>
+            Save
+          </Button>
+        </Group>
+      }
     >
       <ReadOnlyNotice why={useReadOnlyReason(vehicle)} />
-      <NameField value={name} error={reasons["name"]} onChange={(changed) => set({ name: changed })} />
-      <AddressField
-        value={options["address"]}
-        error={reasons["options.address"]}
-        onChange={(address) => set({ options: { ...options, address } })}
-      />
+      <NameField {...form.getInputProps("name")} />
+      <AddressField {...form.getInputProps("options.address")} />
       <FurtherFields
         catalogue={catalogue}
-        options={options}
-        reasons={reasons}
-        onChange={(option, value) => set({ options: { ...options, [option]: value } })}
+        autopilot={autopilotOf(vehicle)}
+        input={(option) => form.getInputProps(`options.${option}`)}
       />
-      <FormErrorNotice error={problem} labels={labels} />
-      <Group>
-        <DeleteVehicle vehicle={vehicle} />
-        <Button component={Link} to={`/vehicles/${vehicle.id}`} variant="default" ms="auto">
-          Cancel
-        </Button>
-        <Button type="submit" loading={edit.isPending}>
-          Save
-        </Button>
-      </Group>
-    </form>
+    </RequestForm>
   );
 }
 

@@ -1,5 +1,5 @@
-import { Anchor, Button, Stack, TextInput } from "@mantine/core";
-import { useState } from "react";
+import { Anchor, Button, Group, Stack, Text, TextInput } from "@mantine/core";
+import { type ReactNode, useState } from "react";
 import { Link } from "react-router";
 import { useActs, useEditVehicle } from "../../api/fleet";
 import { useCatalogue } from "../../api/queries";
@@ -30,6 +30,14 @@ export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boo
   const message = aged === null ? null : messageText(aged);
   const { identity } = vehicle;
   const { data: catalogue } = useCatalogue();
+  const readings = {
+    Activity: status === undefined ? NOTHING : stepWord(status.step),
+    Motors: armedText(status?.armed),
+    Mode: status?.mode || NOTHING,
+    Altitude: withUnit(status?.altitudeM, "m", 2),
+    "Position rate": withUnit(status?.positionHz, "Hz", 0),
+    "Packet loss": status?.lostShare === null || status === undefined ? NOTHING : percent(status.lostShare),
+  };
   return (
     <Panel
       title="Connection"
@@ -45,26 +53,15 @@ export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boo
         {isLinked ? (
           <dl className={`${classes["facts"]} numbers`}>
             <LabelledValue title="Link age" topic="linkAge" value={linkText(aged)} bad={stale} />
-            <LabelledValue
-              title="Activity"
-              value={status === undefined ? NOTHING : stepWord(status.step)}
-              stale={stale}
-            />
-            <LabelledValue title="Motors" value={armedText(status?.armed)} stale={stale} />
-            <LabelledValue title="Mode" value={status?.mode || NOTHING} stale={stale} />
-            <LabelledValue title="Altitude" value={withUnit(status?.altitudeM, "m", 2)} stale={stale} />
-            <LabelledValue title="Position rate" value={withUnit(status?.positionHz, "Hz", 0)} stale={stale} />
-            <LabelledValue
-              title="Packet loss"
-              value={status?.lostShare === null || status === undefined ? NOTHING : percent(status.lostShare)}
-              stale={stale}
-            />
+            {Object.entries(readings).map(([title, value]) => (
+              <LabelledValue key={title} title={title} value={value} stale={stale} />
+            ))}
           </dl>
         ) : (
           <NotConnected vehicle={vehicle} />
         )}
         {message !== null && <Note>{message}</Note>}
-        {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
+        {status?.trouble && <Trouble>{status.trouble}</Trouble>}
         <Note>
           {autopilotTitle(catalogue, vehicle)} at {String(vehicle.options["address"] ?? "")}
           {identity !== null && `; identified as system ${identity.system_id}`}
@@ -73,6 +70,14 @@ export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boo
         </Note>
       </Stack>
     </Panel>
+  );
+}
+
+function Trouble({ children }: { children: ReactNode }) {
+  return (
+    <Text c="var(--bad)" fw={650}>
+      {children}
+    </Text>
   );
 }
 
@@ -85,14 +90,14 @@ function NotConnected({ vehicle }: { vehicle: Vehicle }) {
   return (
     <>
       {other !== null && (
-        <p className={classes["bad"]}>
-          <Anchor component={Link} to={`/vehicles/${other.id}`}>
+        <Trouble>
+          <Anchor component={Link} to={`/vehicles/${other.id}`} fw="inherit">
             {other.name}
           </Anchor>{" "}
           uses the same local port: disconnect it, or change this address.
-        </p>
+        </Trouble>
       )}
-      {failure && other === null && <p className={classes["bad"]}>The last request failed. {failure}</p>}
+      {failure && other === null && <Trouble>The last request failed. {failure}</Trouble>}
       <Note>
         {isWanted ? `Connecting${failure ? "" : ": no vehicle has answered yet"}. ` : "Not connected. "}
         {vehicle.identity === null
@@ -123,23 +128,25 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
           <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
         </dl>
         <form
-          className={classes["row"]}
           onSubmit={(event) => {
             event.preventDefault();
             edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) });
           }}
         >
-          <TextInput
-            label="Battery label"
-            placeholder="No. 3"
-            value={label}
-            maxLength={60}
-            disabled={!vehicle.actions.includes("edit")}
-            onChange={(event) => setTyped(event.currentTarget.value)}
-          />
-          <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
-            Save label
-          </Button>
+          <Group gap={10} align="flex-end">
+            <TextInput
+              label="Battery label"
+              placeholder="No. 3"
+              flex="1 1 180px"
+              value={label}
+              maxLength={60}
+              disabled={!vehicle.actions.includes("edit")}
+              onChange={(event) => setTyped(event.currentTarget.value)}
+            />
+            <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
+              Save label
+            </Button>
+          </Group>
         </form>
         <ErrorNotice error={edit.error} />
       </Stack>

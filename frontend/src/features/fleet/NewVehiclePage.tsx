@@ -1,28 +1,25 @@
-import { Button, Checkbox, Stack, TextInput } from "@mantine/core";
+import { Button, Checkbox, SimpleGrid, Stack, TextInput } from "@mantine/core";
+import { useForm } from "@mantine/form";
 import { IconPlus } from "@tabler/icons-react";
-import { useState } from "react";
 import { useNavigate } from "react-router";
 import { useRegistrationRefusal } from "../../api/access";
 import { useRegisterVehicle } from "../../api/fleet";
-import { reasonsByField, standingProblem } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
-import { SelectField } from "../../ui/Fields";
+import { type NumberEntry, SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
-import { FormErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
+import { FormPage, GainFields, MissingEntries, RequestForm } from "../../ui/FormPage";
+import { ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import {
   autopilotOf,
   gainsFor,
-  isSimulated,
   startingVehicle,
   unreadGains,
-  type VehicleForm,
   vehicleRequest,
   withAutopilot,
-  withSimulation,
+  withUsualAddress,
 } from "./fleet";
 import { AddressField, FurtherFields, furtherLabels, NameField, PLAIN_LABELS } from "./VehicleFields";
 
@@ -45,50 +42,52 @@ const LABELS = {
 };
 
 function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
-  const [form, setForm] = useState<VehicleForm>(() => startingVehicle(catalogue));
+  const form = useForm({ initialValues: startingVehicle(catalogue), transformValues: vehicleRequest });
   const navigate = useNavigate();
   const register = useRegisterVehicle();
-  const set = (change: Partial<VehicleForm>): void => setForm({ ...form, ...change });
-  const setOption = (name: string, value: boolean | number | string): void =>
-    set({ options: { ...form.options, [name]: value } });
-  const gains = gainsFor(catalogue, autopilotOf(form));
-  const labels = {
-    ...LABELS,
-    ...Object.fromEntries(gains.map(({ name }) => [`safe_gains.${name}`, name])),
-    ...furtherLabels(catalogue),
-  };
-  const request = vehicleRequest(form);
-  const problem = standingProblem(register.error, register.variables, request);
-  const reasons = reasonsByField(problem, Object.keys(labels));
-  const unread = unreadGains(form);
-  const simulated = isSimulated(form);
-  const refusal = useRegistrationRefusal(!simulated);
+  const { options } = form.values;
+  const autopilot = autopilotOf(form.values);
+  const gains = gainsFor(catalogue, autopilot);
+  const unread = unreadGains(form.values);
+  const simulated = options["simulated"] === true;
   return (
-    <form
-      noValidate
-      className={classes["form"]}
-      onSubmit={(event) => {
-        event.preventDefault();
-        register.mutate(request, { onSuccess: ({ id }) => void navigate(`/vehicles/${id}`) });
+    <RequestForm
+      form={form}
+      labels={{
+        ...LABELS,
+        ...Object.fromEntries(gains.map(({ name }) => [`safe_gains.${name}`, name])),
+        ...furtherLabels(catalogue),
       }}
+      request={register}
+      onDone={({ id }) => void navigate(`/vehicles/${id}`)}
+      actions={
+        <>
+          <MissingEntries numbers={unread} />
+          <Button
+            type="submit"
+            size="lg"
+            disabled={unread.length > 0}
+            loading={register.isPending}
+            leftSection={<IconPlus size={22} aria-hidden />}
+            ms="auto"
+          >
+            Register vehicle
+          </Button>
+        </>
+      }
     >
-      <ReadOnlyNotice why={refusal} />
-      <NameField value={form.name} error={reasons["name"]} onChange={(name) => set({ name })} />
-      <div className={classes["pair"]}>
+      <ReadOnlyNotice why={useRegistrationRefusal(!simulated)} />
+      <NameField {...form.getInputProps("name")} />
+      <SimpleGrid minColWidth={260} autoFlow="auto-fit" spacing={16}>
         <SelectField
           label={LABELS["options.autopilot"]}
           data={catalogue.autopilots.map(({ name, label }) => ({ value: name, label }))}
-          value={autopilotOf(form)}
-          error={reasons["options.autopilot"]}
-          onChange={(value) => setForm(withAutopilot(form, catalogue, value))}
+          {...form.getInputProps("options.autopilot")}
+          onChange={(value) => form.setValues(withAutopilot(form.values, catalogue, value))}
         />
-        <AddressField
-          value={form.options["address"]}
-          error={reasons["options.address"]}
-          onChange={(address) => setOption("address", address)}
-        />
-      </div>
-      <div className={classes["kind"]} data-real={!simulated || undefined}>
+        <AddressField {...form.getInputProps("options.address")} />
+      </SimpleGrid>
+      <Stack gap={10} align="start" className={classes["kind"]} mod={{ real: !simulated }}>
         <VehicleBadge isReal={!simulated} />
         <p>
           {simulated
@@ -98,18 +97,23 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         <Checkbox
           size="md"
           label={LABELS["options.simulated"]}
-          checked={simulated}
-          error={reasons["options.simulated"]}
-          onChange={(event) => setForm(withSimulation(form, catalogue, event.currentTarget.checked))}
+          {...form.getInputProps("options.simulated", { type: "checkbox" })}
+          onChange={(event) => {
+            const chosen = { ...options, simulated: event.currentTarget.checked };
+            form.setValues({ options: withUsualAddress(catalogue, chosen) });
+          }}
         />
-      </div>
+      </Stack>
       <GainFields
         legend="Safe gains, restored after every flight"
         gains={gains}
-        values={form.safeGains}
-        reasons={reasons}
-        prefix="safe_gains"
-        onChange={(safeGains) => set({ safeGains, confirmed: false })}
+        input={(name) => ({
+          ...form.getInputProps(`safe_gains.${name}`),
+          onChange: (value: NumberEntry) => {
+            form.setFieldValue(`safe_gains.${name}`, value);
+            form.setFieldValue("safe_gains_confirmed", false);
+          },
+        })}
       />
       {!simulated && (
         <Stack gap={12}>
@@ -117,33 +121,21 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
             size="md"
             label={LABELS.safe_gains_confirmed}
             description="Confirms exactly these gains. Changing any of them clears the confirmation."
-            checked={form.confirmed}
-            error={reasons["safe_gains_confirmed"]}
-            onChange={(event) => set({ confirmed: event.currentTarget.checked })}
+            {...form.getInputProps("safe_gains_confirmed", { type: "checkbox" })}
           />
           <TextInput
             label={LABELS.statement}
             placeholder="A. Pilot: flown by hand this morning"
-            value={form.statement}
             maxLength={500}
-            error={reasons["statement"]}
-            onChange={(event) => set({ statement: event.currentTarget.value })}
+            {...form.getInputProps("statement")}
           />
         </Stack>
       )}
-      <FurtherFields catalogue={catalogue} options={form.options} reasons={reasons} onChange={setOption} />
-      <FormErrorNotice error={problem} labels={labels} />
-      <MissingEntries numbers={unread} />
-      <Button
-        type="submit"
-        size="lg"
-        disabled={unread.length > 0}
-        loading={register.isPending}
-        leftSection={<IconPlus size={22} aria-hidden />}
-        className={classes["submit"]}
-      >
-        Register vehicle
-      </Button>
-    </form>
+      <FurtherFields
+        catalogue={catalogue}
+        autopilot={autopilot}
+        input={(option) => form.getInputProps(`options.${option}`)}
+      />
+    </RequestForm>
   );
 }

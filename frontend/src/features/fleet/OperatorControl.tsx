@@ -1,11 +1,10 @@
-import { Button, Text, TextInput } from "@mantine/core";
+import { Button, Group, Stack, Text, TextInput } from "@mantine/core";
 import { IconUserCheck } from "@tabler/icons-react";
 import { useReleaseControl, useTakeControl } from "../../api/control";
 import { useOwnLease } from "../../api/leases";
 import type { Vehicle } from "../../api/types";
 import { ErrorNotice } from "../../ui/Notices";
 import { useOperatorName } from "../../ui/usePreferences";
-import classes from "./Fleet.module.css";
 
 /** Whether this tab has the vehicle's lease. */
 export function useIsInControl(vehicle: Vehicle): boolean {
@@ -22,13 +21,13 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
   const release = useReleaseControl(vehicle.id);
   if (isOwn) {
     return (
-      <div className={classes["control"]}>
-        <span className={classes["inControl"]}>
-          <IconUserCheck size={20} aria-hidden />
+      <Group justify="space-between" gap="0 8px" fz="body">
+        <Group gap={8} wrap="nowrap">
+          <IconUserCheck size={20} color="var(--best)" aria-hidden />
           <span>
             <strong>{own?.operator}</strong>, you are in control
           </span>
-        </span>
+        </Group>
         <Button
           variant="subtle"
           color="gray"
@@ -40,46 +39,49 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
           Release control
         </Button>
         <ErrorNotice error={release.error} />
-      </div>
+      </Group>
     );
   }
   const other = vehicle.control?.operator ?? null;
   const isSameName = other === name.trim();
   return (
     <form
-      className={classes["form"]}
       onSubmit={(event) => {
         event.preventDefault();
         take.mutate({ operator: name.trim(), takeOver: other !== null });
       }}
     >
-      {other !== null && (
-        <Text lh={1.4}>
-          <strong>
-            {other} is in control{isSameName && ", in another tab or browser"}.
-          </strong>{" "}
-          {isSameName ? "Take over to continue here." : "Agree with them, then take over."} All users see the takeover.
-        </Text>
-      )}
-      <div className={classes["take"]}>
-        <TextInput
-          label="Your name"
-          value={name}
-          maxLength={80}
-          autoComplete="name"
-          onChange={(event) => setName(event.currentTarget.value)}
-        />
-        <Button
-          type="submit"
-          variant={other === null ? "filled" : "outline"}
-          color={other === null ? "petrol" : "red"}
-          disabled={name.trim() === ""}
-          loading={take.isPending}
-        >
-          {other === null ? "Take control" : "Take over"}
-        </Button>
-      </div>
-      <ErrorNotice error={take.error} />
+      <Stack gap={12}>
+        {other !== null && (
+          <Text lh={1.4}>
+            <strong>
+              {other} is in control{isSameName && ", in another tab or browser"}.
+            </strong>{" "}
+            {isSameName ? "Take over to continue here." : "Agree with them, then take over."} All users see the
+            takeover.
+          </Text>
+        )}
+        <Group gap={8} align="flex-end" wrap="nowrap">
+          <TextInput
+            label="Your name"
+            flex={1}
+            value={name}
+            maxLength={80}
+            autoComplete="name"
+            onChange={(event) => setName(event.currentTarget.value)}
+          />
+          <Button
+            type="submit"
+            variant={other === null ? "filled" : "outline"}
+            color={other === null ? "petrol" : "red"}
+            disabled={name.trim() === ""}
+            loading={take.isPending}
+          >
+            {other === null ? "Take control" : "Take over"}
+          </Button>
+        </Group>
+        <ErrorNotice error={take.error} />
+      </Stack>
     </form>
   );
 }

@@ -1,10 +1,10 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, type ButtonProps, Group, Stack, Text, TextInput, Title } from "@mantine/core";
 import { IconAlertOctagonFilled, IconArrowBarToDown } from "@tabler/icons-react";
 import { useState } from "react";
 import { useReadOnlyReason } from "../../api/access";
 import { useRelease } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
-import { type CommandAnswer, useVehicleCommands, type VehicleCommand } from "../../api/vehicleCommands";
+import { useVehicleCommands, type VehicleCommand } from "../../api/vehicleCommands";
 import { useVehicleStatus } from "../../live/store";
 import { type Aged, isArmed, isDisarmed } from "../../live/vehicleStatus";
 import { ErrorNotice } from "../../ui/Notices";
@@ -20,45 +20,47 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
   const watching = useReadOnlyReason(vehicle) !== null;
   const isDown = isDisarmed(status);
   return (
-    <section className={classes["quarantine"]}>
+    <Stack gap={14} className={classes["quarantine"]}>
       <div role="alert">
-        <h2>
+        <Title order={2} display="flex" c="var(--bad)" fz="title" mb={6}>
           <IconAlertOctagonFilled size={24} aria-hidden />
-          Quarantined: do not fly
-        </h2>
-        <p>{vehicle.concern}</p>
+          &nbsp;Quarantined: do not fly
+        </Title>
+        <Text lh={1.45}>{vehicle.concern}</Text>
       </div>
-      <p>
+      <Text lh={1.45}>
         {isArmed(status)
           ? "It cannot be flown; Land and Motors off are still available, Check now and Restore safe gains once its motors have stopped."
           : "It cannot be flown; Land, Motors off, Check now and Restore safe gains are still available."}{" "}
         {isDown
           ? "Inspect it, then release it."
           : "Land it, make sure that its motors have stopped, inspect it, then release it."}
-      </p>
-      <div className={classes["row"]}>
-        <LandNow isDown={isDown} orders={orders} />
+      </Text>
+      <Group gap={10} align="flex-end">
+        <LandNow isDown={isDown} orders={orders} flex="1 1 260px" />
         <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching} />
-      </div>
+      </Group>
       <form
-        className={classes["row"]}
         onSubmit={(event) => {
           event.preventDefault();
           release.mutate(statement.trim());
         }}
       >
-        <TextInput
-          label="Inspected by, and findings"
-          value={statement}
-          maxLength={500}
-          onChange={(event) => setStatement(event.currentTarget.value)}
-        />
-        <Button type="submit" variant="default" disabled={statement.trim() === ""} loading={release.isPending}>
-          Release vehicle
-        </Button>
+        <Group gap={10} align="flex-end">
+          <TextInput
+            label="Inspected by, and findings"
+            flex="1 1 260px"
+            value={statement}
+            maxLength={500}
+            onChange={(event) => setStatement(event.currentTarget.value)}
+          />
+          <Button type="submit" variant="default" disabled={statement.trim() === ""} loading={release.isPending}>
+            Release vehicle
+          </Button>
+        </Group>
       </form>
       <ErrorNotice error={release.error} />
-    </section>
+    </Stack>
   );
 }
 
@@ -69,10 +71,11 @@ interface LandProps {
 }
 
 /** The Land command; not the main button for a vehicle that is down. */
-export function LandNow({ isDown, orders }: LandProps) {
+export function LandNow({ isDown, orders, flex }: LandProps & Pick<ButtonProps, "flex">) {
   return (
     <Button
       size="lg"
+      flex={flex}
       {...(isDown ? { variant: "default" } : { color: "red" })}
       leftSection={<IconArrowBarToDown size={22} aria-hidden />}
       onClick={() => orders.press("land")}
@@ -109,18 +112,14 @@ export function MotorsOff({ vehicle, status, orders, watching = false }: Props) 
 
 const COMMANDS: Record<VehicleCommand, string> = { land: "Land", "motors off": "Motors off" };
 
-/** Result of the last command, as an alert. */
+/** Result of the last command, as an alert; once the motors are off, that they are. */
 export function CommandResult({ orders: { said }, isDown }: LandProps) {
   if (said === null) return null;
+  const { accepted, order, sentence } = said;
+  const confirmed = isDown ? "The motors are off." : sentence;
   return (
-    <p className={classes["said"]} data-bad={!said.accepted || undefined} role="alert">
-      {commandText(said, isDown)}
-    </p>
+    <Text flex={1} miw={160} fz="small" lh={1.35} role="alert" {...(!accepted && { c: "var(--bad)", fw: 650 })}>
+      {accepted ? confirmed : `${COMMANDS[order]} not confirmed. ${sentence}`}
+    </Text>
   );
-}
-
-/** The answer to the command; once the motors are off, that they are. */
-function commandText({ accepted, order, sentence }: CommandAnswer, isDown: boolean): string {
-  if (!accepted) return `${COMMANDS[order]} not confirmed. ${sentence}`;
-  return isDown ? "The motors are off." : sentence;
 }

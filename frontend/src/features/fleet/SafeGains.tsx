@@ -1,28 +1,35 @@
-import { Button, Group, Stack, TextInput } from "@mantine/core";
-import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
+import { Button, Group, SimpleGrid, Stack, TextInput } from "@mantine/core";
+import { useForm } from "@mantine/form";
 import { useState } from "react";
 import { useEditVehicle } from "../../api/fleet";
-import { problemOf, reasonsByField } from "../../api/problems";
-import type { Vehicle } from "../../api/types";
+import type { Vehicle, VehicleEdit } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
 import { heldGains, isArmed } from "../../live/vehicleStatus";
-import { type NumberEntry, NumberField } from "../../ui/Fields";
+import { NumberField, numbersOf } from "../../ui/Fields";
+import { RequestForm } from "../../ui/FormPage";
 import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, RESTORED, safeGainsWritten, sameHeld } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
-import { FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
-import { unknownGainsText } from "./fleet";
+import { unknownGainsText, unreadGains, type VehicleForm } from "./fleet";
+import { CheckResult } from "./VehicleReadings";
 
 interface Props {
   vehicle: Vehicle;
   restoring: boolean;
   onRestore: () => void;
 }
+
+/** The current gains against the safe gains, while data comes from the vehicle and after. */
+const SAFE = ["Current gains are the safe gains", "Safe gains at the last reading"];
+const DIFFERENT = [
+  "Current gains differ from the safe gains",
+  "Gains differed from the safe gains at the last reading",
+];
 
 /** The vehicle's current gains next to its safe gains. */
 export function SafeGains({ vehicle, restoring, onRestore }: Props) {
@@ -32,6 +39,8 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   const held = inOrder(heldGains(vehicle, status), Object.keys(safe));
   const isCurrent = status?.isCurrent ?? false;
   const isKnown = Object.keys(held).length > 0;
+  const isSafe = sameHeld(held, safe);
+  const [now, before] = isSafe ? SAFE : DIFFERENT;
   const mayRestore = vehicle.actions.includes("restore");
   if (entered) return <SafeGainsForm vehicle={vehicle} entered={entered} onDone={() => setEntered(undefined)} />;
   return (
@@ -59,20 +68,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
             ))}
           </tbody>
         </table>
-        {isKnown && sameHeld(held, safe) && (
-          <span className={classes["good"]}>
-            <IconCircleCheck size={18} aria-hidden />{" "}
-            {isCurrent ? "Current gains are the safe gains" : "Safe gains at the last reading"}
-          </span>
-        )}
-        {isKnown && !sameHeld(held, safe) && (
-          <span className={classes["bad"]}>
-            <IconAlertTriangle size={18} aria-hidden />{" "}
-            {isCurrent
-              ? "Current gains differ from the safe gains"
-              : "Gains differed from the safe gains at the last reading"}
-          </span>
-        )}
+        {isKnown && <CheckResult passed={isSafe}>{isCurrent ? now : before}</CheckResult>}
         <Note>
           {isKnown ? (
             <>
@@ -81,14 +77,14 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           ) : (
             unknownGainsText(vehicle, status)
           )}{" "}
-          {isKnown && !sameHeld(held, safe) ? safeGainsWritten(vehicle) : RESTORED}
+          {isKnown && !isSafe ? safeGainsWritten(vehicle) : RESTORED}
           {mayRestore && isArmed(status) && " They can be restored on request once its motors have stopped."}
         </Note>
         <Group gap={10}>
           <Button variant="default" disabled={!mayRestore || isArmed(status)} loading={restoring} onClick={onRestore}>
             Restore safe gains
           </Button>
-          {isKnown && !sameHeld(held, safe) && (
+          {isKnown && !isSafe && (
             <Button variant="default" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(held)}>
               Set current gains as safe gains
             </Button>
@@ -112,61 +108,55 @@ interface FormProps {
 const DECIDED_BY = "Decided by, and why";
 
 function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
-  const [gains, setGains] = useState<Record<string, NumberEntry>>({ ...vehicle.safe_gains, ...entered });
-  const [statement, setStatement] = useState("");
-  const edit = useEditVehicle(vehicle.id);
-  const labels = {
-    ...Object.fromEntries(Object.keys(gains).map((name) => [`safe_gains.${name}`, name])),
-    statement: DECIDED_BY,
-  };
-  const reasons = reasonsByField(problemOf(edit.error), Object.keys(labels));
-  const read = Object.entries(gains).filter((entry): entry is [string, number] => typeof entry[1] === "number");
+  const { id, version, safe_gains: safe } = vehicle;
+  const names = Object.keys(safe);
+  const form = useForm<Pick<VehicleForm, "safe_gains" | "statement">, VehicleEdit>({
+    initialValues: { safe_gains: { ...safe, ...entered }, statement: "" },
+    transformValues: ({ safe_gains, statement }) => ({
+      version,
+      safe_gains: numbersOf(safe_gains),
+      statement: statement.trim() || null,
+    }),
+  });
+  const edit = useEditVehicle(id);
   return (
     <Panel title="Change safe gains">
-      <form
-        className={classes["stack"]}
-        onSubmit={(event) => {
-          event.preventDefault();
-          edit.mutate(
-            { version: vehicle.version, safe_gains: Object.fromEntries(read), statement: statement.trim() || null },
-            { onSuccess: onDone },
-          );
+      <RequestForm
+        form={form}
+        labels={{
+          ...Object.fromEntries(names.map((name) => [`safe_gains.${name}`, name])),
+          statement: DECIDED_BY,
         }}
+        request={edit}
+        onDone={onDone}
+        actions={
+          <Group gap={10}>
+            <Button
+              type="submit"
+              disabled={unreadGains(form.values).length > 0 || form.values.statement.trim() === ""}
+              loading={edit.isPending}
+            >
+              Save safe gains
+            </Button>
+            <Button variant="default" onClick={onDone}>
+              Cancel
+            </Button>
+          </Group>
+        }
       >
-        <div className={classes["entries"]}>
-          {Object.keys(vehicle.safe_gains).map((name) => (
+        <SimpleGrid minColWidth={110} autoFlow="auto-fit" spacing={12}>
+          {names.map((name) => (
             <NumberField
               key={name}
               required
               withAsterisk={false}
               label={name}
-              value={gains[name] ?? ""}
-              error={reasons[`safe_gains.${name}`]}
-              onChange={(value) => setGains({ ...gains, [name]: value })}
+              {...form.getInputProps(`safe_gains.${name}`)}
             />
           ))}
-        </div>
-        <TextInput
-          label={DECIDED_BY}
-          value={statement}
-          maxLength={500}
-          error={reasons["statement"]}
-          onChange={(event) => setStatement(event.currentTarget.value)}
-        />
-        <FormErrorNotice error={edit.error} labels={labels} />
-        <Group gap={10}>
-          <Button
-            type="submit"
-            disabled={read.length < Object.keys(gains).length || statement.trim() === ""}
-            loading={edit.isPending}
-          >
-            Save safe gains
-          </Button>
-          <Button variant="default" onClick={onDone}>
-            Cancel
-          </Button>
-        </Group>
-      </form>
+        </SimpleGrid>
+        <TextInput label={DECIDED_BY} maxLength={500} {...form.getInputProps("statement")} />
+      </RequestForm>
     </Panel>
   );
 }

@@ -1,4 +1,4 @@
-import { Anchor, Button } from "@mantine/core";
+import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
 import { IconPlugConnected } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useVehicleRequest } from "../../api/fleet";
@@ -11,7 +11,7 @@ import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { ErrorNotice } from "../../ui/Notices";
 import row from "../../ui/RowCard.module.css";
-import classes from "./VehicleCard.module.css";
+import classes from "./Fleet.module.css";
 import { VehicleStateBadge } from "./VehicleStateBadge";
 
 /** A vehicle in the list: state, gains, next action. */
@@ -23,16 +23,21 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const isKnown = Object.keys(held).length > 0;
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
-    <li className={`${row["card"]} ${classes["card"]}`} data-state={vehicle.state}>
-      <div className={`${row["what"]} ${classes["what"]}`}>
-        <h3 className={classes["name"]}>
+    <li
+      className={row["card"]}
+      style={{ alignItems: "center", borderColor: vehicle.state === "quarantined" ? "var(--bad)" : undefined }}
+    >
+      <Stack gap={8} miw={0}>
+        <Group gap="4px 12px">
           <VehicleBadge isReal={vehicle.is_real} />
-          <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
-            {vehicle.name}
-          </Anchor>
+          <Text component="h3" lh="inherit">
+            <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="block" py={6}>
+              {vehicle.name}
+            </Anchor>
+          </Text>
           <VehicleStateBadge vehicle={vehicle} />
-        </h3>
-        <dl className={`${classes["facts"]} numbers`}>
+        </Group>
+        <dl className={`${classes["readings"]} numbers`}>
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
           {vehicle.registered && (isKnown || isLinked) && (
@@ -46,7 +51,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
         </dl>
         {vehicle.state === "quarantined" && <Aside tone="bad">{vehicle.concern}</Aside>}
         <ErrorNotice error={ask.error} />
-      </div>
+      </Stack>
       {vehicle.registered && vehicle.actions.includes("connect") && (
         <Button
           variant="default"
@@ -70,7 +75,9 @@ function Fact({ title, value }: { title: string; value: string }) {
   return (
     <div>
       <dt>{title}</dt>
-      <dd>{value}</dd>
+      <Text component="dd" fw={550} fz="body">
+        {value}
+      </Text>
     </div>
   );
 }

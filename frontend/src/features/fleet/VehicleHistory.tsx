@@ -1,4 +1,4 @@
-import { Anchor, Button, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Button, Skeleton, Stack, useComputedColorScheme } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useActs, useLedger } from "../../api/fleet";
@@ -151,7 +151,7 @@ function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
   const retune = known.data?.retune;
   return (
     <>
-      <div className={`${classes["wide"]} ${classes["stack"]}`}>
+      <Stack gap={14} className={classes["wide"] ?? ""}>
         <ErrorNotice error={known.error} />
         {retune?.due && (
           <Aside tone="warn" display="flex" style={{ gap: 8 }} role="status">
@@ -168,7 +168,7 @@ function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
           height={heightOf(calibration.data, 460)}
           note={retune && !retune.due && calibration.data?.state === "ready" ? retune.sentence : undefined}
         />
-      </div>
+      </Stack>
       <FigurePanel
         title="Batteries"
         card={batteries.data}

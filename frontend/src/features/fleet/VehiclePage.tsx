@@ -1,5 +1,6 @@
-import { Anchor, Button, Group, SimpleGrid, Skeleton, Title } from "@mantine/core";
+import { Anchor, Button, Group, SimpleGrid, Skeleton, Stack, Title } from "@mantine/core";
 import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
+import type { ReactNode } from "react";
 import { Link, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useVehicleRequest, type VehicleRequest } from "../../api/fleet";
@@ -32,13 +33,13 @@ export function VehiclePage() {
   return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;
 }
 
-/** A shared simulation: no link, but a calibration and gain history. */
-function SharedView({ vehicle }: { vehicle: Vehicle }) {
+/** Name and state of the vehicle above its panels, with its buttons on the right. */
+function VehicleHead({ vehicle, children }: { vehicle: Vehicle; children?: ReactNode }) {
   return (
-    <>
-      <Group gap="6px 14px" mb={14}>
-        <Anchor component={Link} to="/vehicles" className={classes["back"]}>
-          <IconChevronLeft size={20} aria-hidden />
+    <Group justify="space-between" gap="6px 14px">
+      <Group gap="6px 14px">
+        <Anchor component={Link} to="/vehicles" c="dimmed" display="inline-flex" lh="44px">
+          <IconChevronLeft size={20} style={{ alignSelf: "center" }} aria-hidden />
           Vehicles
         </Anchor>
         <Title order={1} style={{ overflowWrap: "anywhere" }}>
@@ -47,11 +48,21 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
         <VehicleBadge isReal={vehicle.is_real} />
         <VehicleStateBadge vehicle={vehicle} />
       </Group>
+      {children && <Group gap={8}>{children}</Group>}
+    </Group>
+  );
+}
+
+/** A shared simulation: no link, but a calibration and gain history. */
+function SharedView({ vehicle }: { vehicle: Vehicle }) {
+  return (
+    <Stack gap={14}>
+      <VehicleHead vehicle={vehicle} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
+      <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
         <VehicleHistory vehicle={vehicle} />
       </SimpleGrid>
-    </>
+    </Stack>
   );
 }
 
@@ -63,51 +74,40 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const may = (act: VehicleRequest): boolean => watching === null && vehicle.actions.includes(act);
   const asking = ask.isPending ? ask.variables : null;
   return (
-    <>
-      <Group gap="6px 14px" mb={14}>
-        <Anchor component={Link} to="/vehicles" className={classes["back"]}>
-          <IconChevronLeft size={20} aria-hidden />
-          Vehicles
-        </Anchor>
-        <Title order={1} style={{ overflowWrap: "anywhere" }}>
-          {vehicle.name}
-        </Title>
-        <VehicleBadge isReal={vehicle.is_real} />
-        <VehicleStateBadge vehicle={vehicle} />
-        <div className={classes["acts"]}>
+    <Stack gap={14}>
+      <VehicleHead vehicle={vehicle}>
+        <Button
+          component={Link}
+          to={`/new?vehicle=${vehicle.id}`}
+          variant="default"
+          leftSection={<IconPlus size={20} aria-hidden />}
+        >
+          New campaign
+        </Button>
+        {may("connect") && (
           <Button
-            component={Link}
-            to={`/new?vehicle=${vehicle.id}`}
-            variant="default"
-            leftSection={<IconPlus size={20} aria-hidden />}
+            leftSection={<IconPlugConnected size={20} aria-hidden />}
+            loading={asking === "connect"}
+            onClick={() => ask.mutate("connect")}
           >
-            New campaign
+            Connect
           </Button>
-          {may("connect") && (
-            <Button
-              leftSection={<IconPlugConnected size={20} aria-hidden />}
-              loading={asking === "connect"}
-              onClick={() => ask.mutate("connect")}
-            >
-              Connect
-            </Button>
-          )}
-          {may("disconnect") && (
-            <Button
-              variant="default"
-              leftSection={<IconPlugConnectedX size={20} aria-hidden />}
-              loading={asking === "disconnect"}
-              onClick={() => ask.mutate("disconnect")}
-            >
-              {vehicle.state === "disconnected" ? "Stop connecting" : "Disconnect"}
-            </Button>
-          )}
-        </div>
-      </Group>
+        )}
+        {may("disconnect") && (
+          <Button
+            variant="default"
+            leftSection={<IconPlugConnectedX size={20} aria-hidden />}
+            loading={asking === "disconnect"}
+            onClick={() => ask.mutate("disconnect")}
+          >
+            {vehicle.state === "disconnected" ? "Stop connecting" : "Disconnect"}
+          </Button>
+        )}
+      </VehicleHead>
       <ReadOnlyNotice why={watching} />
       <ErrorNotice error={ask.error} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
+      <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
         <LinkPanel vehicle={vehicle} mayEdit={watching === null && vehicle.actions.includes("configure")} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
         <Panel title="Operator">
@@ -142,6 +142,6 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           onRead={() => ask.mutate("parameters")}
         />
       </SimpleGrid>
-    </>
+    </Stack>
   );
 }

@@ -1,6 +1,6 @@
-import { Button, Stack, TextInput } from "@mantine/core";
+import { Button, Group, Stack, TextInput } from "@mantine/core";
 import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
-import { useState } from "react";
+import { type ReactNode, useState } from "react";
 import { useActs } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { gainText } from "../../ui/format";
@@ -18,6 +18,17 @@ const OUTDATED: Partial<Record<Vehicle["state"], string>> = {
 };
 
 const STEPS_REQUIRE = "Altitude steps require more, which is checked before each such flight.";
+
+/** Result of a check in words, with its colour and icon. */
+export function CheckResult({ passed, children }: { passed: boolean; children: ReactNode }) {
+  const Icon = passed ? IconCircleCheck : IconAlertTriangle;
+  return (
+    <Group gap={6} wrap="nowrap" c={passed ? "var(--best)" : "var(--bad)"} fw={650}>
+      <Icon size={18} aria-hidden />
+      {children}
+    </Group>
+  );
+}
 
 /** All items of the last preflight check; outdated ones are grey. */
 export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle: Vehicle }) {
@@ -51,15 +62,7 @@ export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle:
                   {!passed && hint && <small>{hint}</small>}
                 </th>
                 <td>
-                  {passed ? (
-                    <span className={classes["good"]}>
-                      <IconCircleCheck size={18} aria-hidden /> passed
-                    </span>
-                  ) : (
-                    <span className={classes["bad"]}>
-                      <IconAlertTriangle size={18} aria-hidden /> failed
-                    </span>
-                  )}
+                  <CheckResult passed={passed}>{passed ? "passed" : "failed"}</CheckResult>
                 </td>
                 <td>
                   {found}
@@ -117,7 +120,7 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
               onChange={(event) => setWanted(event.currentTarget.value)}
             />
             {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
-            <section className={classes["parameters"]} aria-label="Parameters" tabIndex={0}>
+            <section style={{ maxHeight: 420, overflow: "auto" }} aria-label="Parameters" tabIndex={0}>
               <table className={`${table["table"]} ${classes["table"]}`}>
                 <tbody>
                   {found.map(([name, value]) => (

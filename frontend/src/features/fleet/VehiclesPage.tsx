@@ -3,6 +3,7 @@ import { IconPlus } from "@tabler/icons-react";
 import { Fragment } from "react";
 import { Link } from "react-router";
 import { useCatalogue } from "../../api/queries";
+import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
 import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
@@ -13,8 +14,8 @@ import { VehicleCard } from "./VehicleCard";
 export function VehiclesPage() {
   useTitle("Vehicles");
   const vehicles = useVehicles();
-  const registered = vehicles.data?.filter((vehicle) => vehicle.registered) ?? [];
-  const shared = vehicles.data?.filter((vehicle) => !vehicle.registered) ?? [];
+  const ofKind = (registered: boolean) => vehicles.data?.filter((vehicle) => vehicle.registered === registered) ?? [];
+  const registered = ofKind(true);
   return (
     <>
       <Group justify="space-between" gap={12} mb={14}>
@@ -27,32 +28,26 @@ export function VehiclesPage() {
       {vehicles.isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
       {vehicles.data && registered.length === 0 && <NoVehicles />}
       <Stack gap={28}>
-        {registered.length > 0 && (
-          <section>
-            <Title order={2} c="dimmed" fz="body" mb={10}>
-              Registered vehicles
-            </Title>
-            <ul className={classes["list"]} aria-label="Registered vehicles">
-              {registered.map((vehicle) => (
-                <VehicleCard key={vehicle.id} vehicle={vehicle} />
-              ))}
-            </ul>
-          </section>
-        )}
-        {shared.length > 0 && (
-          <section>
-            <Title order={2} c="dimmed" fz="body" mb={10}>
-              Shared simulations and vehicles flown elsewhere
-            </Title>
-            <ul className={classes["list"]} aria-label="Shared simulations">
-              {shared.map((vehicle) => (
-                <VehicleCard key={vehicle.id} vehicle={vehicle} />
-              ))}
-            </ul>
-          </section>
-        )}
+        <Vehicles title="Registered vehicles" vehicles={registered} />
+        <Vehicles title="Shared simulations and vehicles flown elsewhere" vehicles={ofKind(false)} />
       </Stack>
     </>
+  );
+}
+
+function Vehicles({ title, vehicles }: { title: string; vehicles: readonly Vehicle[] }) {
+  if (vehicles.length === 0) return null;
+  return (
+    <section>
+      <Title order={2} c="dimmed" fz="body" mb={10}>
+        {title}
+      </Title>
+      <ul className={classes["list"]} aria-label={title}>
+        {vehicles.map((vehicle) => (
+          <VehicleCard key={vehicle.id} vehicle={vehicle} />
+        ))}
+      </ul>
+    </section>
   );
 }
 

@@ -4,7 +4,6 @@ import type { Aged } from "../../live/vehicleStatus";
 import {
   connectFailure,
   furtherOptions,
-  gainsFor,
   groundedReason,
   parametersOf,
   startingVehicle,
@@ -14,7 +13,7 @@ import {
   vehicleRequest,
   vehicleStateLabel,
   withAutopilot,
-  withSimulation,
+  withUsualAddress,
 } from "./fleet";
 
 const catalogue = {
@@ -58,32 +57,31 @@ const catalogue = {
   ],
 } as unknown as Catalogue;
 
+const start = startingVehicle(catalogue);
+
 test("another autopilot brings its own gains and usual address, and nobody has looked at them yet", () => {
-  const form = withAutopilot({ ...startingVehicle(catalogue), confirmed: true }, catalogue, "px4");
+  const form = withAutopilot({ ...start, safe_gains_confirmed: true }, catalogue, "px4");
   expect(form.options).toEqual({ autopilot: "px4", address: "udpin:127.0.0.1:14550", simulated: false });
-  expect(form.safeGains).toEqual({ MPC_Z_P: 1 });
-  expect(form.confirmed).toBe(false);
-  expect(gainsFor(catalogue, "px4").map(({ name }) => name)).toEqual(["MPC_Z_P"]);
+  expect(form.safe_gains).toEqual({ MPC_Z_P: 1 });
+  expect(form.safe_gains_confirmed).toBe(false);
 });
 
 test("a simulated vehicle has its autopilot's usual address too, whichever was chosen first", () => {
-  const simulated = withSimulation(startingVehicle(catalogue), catalogue, true);
-  expect(simulated.options["address"]).toBe("udp:127.0.0.1:4245@4244");
-  const px4 = withAutopilot(simulated, catalogue, "px4");
+  const simulated = withUsualAddress(catalogue, { ...start.options, simulated: true });
+  expect(simulated["address"]).toBe("udp:127.0.0.1:4245@4244");
+  const px4 = withAutopilot({ ...start, options: simulated }, catalogue, "px4");
   expect(px4.options["address"]).toBe("udpin:127.0.0.1:14550");
-  expect(withSimulation(px4, catalogue, false).options["address"]).toBe("udpin:127.0.0.1:14550");
 });
 
 test("an address that somebody has typed stays with another autopilot", () => {
-  const start = startingVehicle(catalogue);
   const typed = { ...start, options: { ...start.options, address: "serial:/dev/ttyUSB0:57600" } };
   expect(withAutopilot(typed, catalogue, "px4").options["address"]).toBe("serial:/dev/ttyUSB0:57600");
 });
 
 test("the request has the numbers as they are, and names without the spaces around them", () => {
-  const start = startingVehicle(catalogue);
-  const form = { ...start, name: " Bee ", confirmed: true, statement: " Ada has looked " };
-  expect(vehicleRequest({ ...form, options: { ...form.options, min_battery_v: 11 } })).toEqual({
+  const options = { ...start.options, min_battery_v: 11 };
+  const form = { ...start, name: " Bee ", options, safe_gains_confirmed: true, statement: " Ada has looked " };
+  expect(vehicleRequest(form)).toEqual({
     name: "Bee",
     kind: "mavlink",
     options: { autopilot: "paparazzi", address: "udp:192.168.1.1:4245@4244", simulated: false, min_battery_v: 11 },
@@ -94,22 +92,14 @@ test("the request has the numbers as they are, and names without the spaces arou
 });
 
 test("a gain that is no number yet is named, and not sent", () => {
-  const start = startingVehicle(catalogue);
-  const form = { ...start, safeGains: { ...start.safeGains, ki: "1e" } };
+  const form = { ...start, safe_gains: { ...start.safe_gains, ki: "1e" } };
   expect(unreadGains(form)).toEqual(["ki"]);
   expect(vehicleRequest(form).safe_gains).toEqual({ kp: 283, kd: 82 });
 });
 
-test("only what has no place of its own is folded away", () => {
-  expect(furtherOptions(catalogue).map(({ name }) => name)).toEqual([
-    "min_battery_v",
-    "aircraft_id",
-    "signing_key_file",
-  ]);
-});
-
-test("an autopilot is asked for no option of another one", () => {
-  const names = (autopilot: string): string[] => furtherOptions(catalogue, autopilot).map(({ name }) => name);
+test("only what has no place of its own is folded away, and an autopilot is asked for no option of another one", () => {
+  const names = (autopilot?: string): string[] => furtherOptions(catalogue, autopilot).map(({ name }) => name);
+  expect(names()).toEqual(["min_battery_v", "aircraft_id", "signing_key_file"]);
   expect(names("paparazzi")).toEqual(["min_battery_v", "aircraft_id"]);
   expect(names("px4")).toEqual(["min_battery_v", "signing_key_file"]);
 });

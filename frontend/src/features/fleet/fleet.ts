@@ -11,7 +11,7 @@ import type {
   VehicleState,
 } from "../../api/types";
 import type { Aged } from "../../live/vehicleStatus";
-import type { NumberEntry, OptionValue } from "../../ui/Fields";
+import { type NumberEntry, numbersOf, type OptionValue } from "../../ui/Fields";
 import type { StateLabel } from "../../ui/states";
 
 const STATES: Record<VehicleState, StateLabel> = {
@@ -98,11 +98,6 @@ export function purposeOf({ purpose, asked }: Pick<GivenGains, "purpose" | "aske
   return Object.keys(asked).length === 0 ? "Found at connection, nothing sent" : PURPOSES[purpose];
 }
 
-function usualAddress({ autopilots }: Catalogue, autopilot: string, simulated: boolean): string {
-  const found = autopilots.find(({ name }) => name === autopilot);
-  return (simulated ? found?.simulated_address : found?.address) ?? "";
-}
-
 export function autopilotTitle(catalogue: Catalogue | undefined, { options }: Pick<Vehicle, "options">): string {
   return catalogue?.autopilots.find(({ name }) => name === options["autopilot"])?.label ?? "";
 }
@@ -111,11 +106,12 @@ const KIND = "mavlink";
 /** Options with their own fields in the form. */
 const PLAIN: ReadonlySet<string> = new Set(["autopilot", "address", "simulated"]);
 
+/** Fields of a vehicle to register, under the names of the request; text in a gain is not a number yet. */
 export interface VehicleForm {
   name: string;
   options: Record<string, OptionValue>;
-  safeGains: Record<string, NumberEntry>;
-  confirmed: boolean;
+  safe_gains: Record<string, NumberEntry>;
+  safe_gains_confirmed: boolean;
   statement: string;
 }
 
@@ -129,19 +125,10 @@ export function gainsFor({ autopilots, experiments }: Catalogue, autopilot: stri
   return experiments.find(({ name }) => name === takeoff)?.gains ?? [];
 }
 
-function defaultGains(catalogue: Catalogue, autopilot: string): Record<string, NumberEntry> {
-  return Object.fromEntries(gainsFor(catalogue, autopilot).map((gain) => [gain.name, gain.default]));
-}
-
 export function startingVehicle(catalogue: Catalogue): VehicleForm {
-  const autopilot = catalogue.autopilots[0]?.name ?? "";
-  return {
-    name: "",
-    options: { autopilot, address: usualAddress(catalogue, autopilot, false), simulated: false },
-    safeGains: defaultGains(catalogue, autopilot),
-    confirmed: false,
-    statement: "",
-  };
+  const options = { simulated: false };
+  const form = { name: "", options, safe_gains: {}, safe_gains_confirmed: false, statement: "" };
+  return withAutopilot(form, catalogue, catalogue.autopilots[0]?.name ?? "");
 }
 
 /** Select an autopilot: resets the gains and updates an unedited address. */
@@ -149,24 +136,18 @@ export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot
   return {
     ...form,
     options: withUsualAddress(catalogue, { ...form.options, autopilot }),
-    safeGains: defaultGains(catalogue, autopilot),
-    confirmed: false,
+    safe_gains: Object.fromEntries(gainsFor(catalogue, autopilot).map((gain) => [gain.name, gain.default])),
+    safe_gains_confirmed: false,
   };
 }
 
 /** The options with the usual address of their vehicle, unless the address was edited. */
-function withUsualAddress(catalogue: Catalogue, options: VehicleForm["options"]): VehicleForm["options"] {
-  const isUsual = catalogue.autopilots.some(
-    ({ address, simulated_address }) => options["address"] === address || options["address"] === simulated_address,
-  );
-  return isUsual
-    ? { ...options, address: usualAddress(catalogue, autopilotOf({ options }), options["simulated"] === true) }
-    : options;
-}
-
-/** Register a simulation or a real vehicle: updates an unedited address. */
-export function withSimulation(form: VehicleForm, catalogue: Catalogue, simulated: boolean): VehicleForm {
-  return { ...form, options: withUsualAddress(catalogue, { ...form.options, simulated }) };
+export function withUsualAddress({ autopilots }: Catalogue, options: VehicleForm["options"]): VehicleForm["options"] {
+  const { address, autopilot, simulated } = options;
+  const isUsual = autopilots.some((one) => address === one.address || address === one.simulated_address);
+  if (address !== undefined && !isUsual) return options;
+  const found = autopilots.find(({ name }) => name === autopilot);
+  return { ...options, address: (simulated ? found?.simulated_address : found?.address) ?? "" };
 }
 
 /** The local port that an address needs for itself; the whole address if it names none. */
@@ -197,26 +178,18 @@ export function furtherOptions(catalogue: Catalogue, autopilot?: string): Option
   return options.filter((option) => !PLAIN.has(option.name) && isOffered(option));
 }
 
-export function isSimulated(form: VehicleForm): boolean {
-  return form.options["simulated"] === true;
-}
-
 /** Names of safe gains without a valid number. */
-export function unreadGains({ safeGains }: VehicleForm): string[] {
-  return Object.entries(safeGains).flatMap(([name, entry]) => (typeof entry === "number" ? [] : [name]));
+export function unreadGains({ safe_gains }: Pick<VehicleForm, "safe_gains">): string[] {
+  return Object.keys(safe_gains).filter((name) => typeof safe_gains[name] !== "number");
 }
 
-export function vehicleRequest(form: VehicleForm): NewVehicle {
-  const gains = Object.entries(form.safeGains).flatMap(([name, entry]) =>
-    typeof entry === "number" ? [[name, entry]] : [],
-  );
+export function vehicleRequest({ name, statement, safe_gains, ...form }: VehicleForm): NewVehicle {
   return {
-    name: form.name.trim(),
+    ...form,
     kind: KIND,
-    options: form.options,
-    safe_gains: Object.fromEntries(gains) as Record<string, number>,
-    safe_gains_confirmed: form.confirmed,
-    statement: form.statement.trim(),
+    name: name.trim(),
+    safe_gains: numbersOf(safe_gains),
+    statement: statement.trim(),
   };
 }
 

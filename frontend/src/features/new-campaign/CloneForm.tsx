@@ -1,4 +1,4 @@
-import { Button, Switch } from "@mantine/core";
+import { Button, Group, Stack, Switch } from "@mantine/core";
 import { IconCopy } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
@@ -9,7 +9,6 @@ import { useVehicles } from "../../api/vehicles";
 import { SelectField } from "../../ui/Fields";
 import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
-import classes from "./NewCampaign.module.css";
 import { kindsFor, registeredFor } from "./newCampaign";
 
 interface Props extends Pick<Campaign, "id" | "vehicle"> {
@@ -31,7 +30,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
   const chosen = registered.find(({ id }) => String(id) === vehicle);
   const choice = chosen === undefined ? { kind: vehicle } : { kind: chosen.kind, id: chosen.id };
   return (
-    <div className={classes["clone"]}>
+    <Stack gap={8}>
       <SelectField
         label="Clone to vehicle"
         data={[
@@ -42,7 +41,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
         onChange={setVehicle}
       />
       {bestFlight !== null && (
-        <div className={classes["start"]}>
+        <Group gap={8} mih={48}>
           <Switch
             size="md"
             label={`Start from flight ${bestFlight}`}
@@ -50,7 +49,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
             onChange={(event) => setWarm(event.currentTarget.checked)}
           />
           <HelpTip topic="warmStart" />
-        </div>
+        </Group>
       )}
       <Button
         variant="default"
@@ -67,6 +66,6 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
         Clone
       </Button>
       <ErrorNotice error={clone.error} />
-    </div>
+    </Stack>
   );
 }

@@ -1,6 +1,6 @@
-import { Stack, TextInput, UnstyledButton } from "@mantine/core";
+import { Button, Stack, Text, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
-import { useState } from "react";
+import { type ReactNode, useState } from "react";
 import { useCampaigns } from "../../api/queries";
 import type { CampaignSummary } from "../../api/types";
 import { Aside } from "../../ui/Aside";
@@ -11,18 +11,20 @@ import classes from "./NewCampaign.module.css";
 
 interface Props {
   experiment: string;
-  donor: CampaignSummary | null;
-  error: string | undefined;
+  label: ReactNode;
+  value?: CampaignSummary | null;
+  error: ReactNode;
   onChange: (donor: CampaignSummary | null) => void;
 }
 
 const OFFERED = 6;
 
 /** Search for the campaign whose best gains are flown first. */
-export function DonorPicker({ experiment, donor, error, onChange }: Props) {
+export function DonorPicker({ experiment, label, value: donor = null, error, onChange }: Props) {
   const [search, setSearch] = useState(donor?.name ?? "");
   const [sought] = useDebouncedValue(search.trim(), 200);
   const found = useCampaigns({ search: sought, state: [], vehicle: [], sort: "-updated" });
+  const unit = useUnits(experiment).error;
   const usable = (found.data?.pages.flatMap((page) => page.items) ?? []).filter(
     (campaign) => campaign.best !== null && campaign.experiment === experiment,
   );
@@ -33,7 +35,7 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
   return (
     <Stack gap={8}>
       <TextInput
-        label="Campaign"
+        label={label}
         type="search"
         placeholder="Search by name"
         autoComplete="off"
@@ -49,62 +51,40 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
           if (usable[0] !== undefined && sought === search.trim()) choose(usable[0]);
         }}
       />
-      {donor === null && found.data !== undefined && (
-        <Offers campaigns={usable} isAll={sought === "" && !found.hasNextPage} onChoose={choose} />
+      {donor === null && found.data !== undefined && usable.length === 0 && (
+        <p role="status">
+          {sought === "" && !found.hasNextPage
+            ? "No campaign of this experiment has a valid flight yet."
+            : "No campaigns match. Only campaigns of this experiment with a valid flight are listed."}
+        </p>
       )}
-      {donor?.best && <Taken donor={donor} best={donor.best} experiment={experiment} />}
+      {donor === null && usable.length > 0 && (
+        <ul className={classes["offers"]} aria-label="Campaigns to start from">
+          {usable.slice(0, OFFERED).map((campaign) => (
+            <li key={campaign.id}>
+              <Button variant="subtle" c="inherit" fw={400} fullWidth justify="start" onClick={() => choose(campaign)}>
+                {campaign.name} · {campaign.vehicle.title}
+              </Button>
+            </li>
+          ))}
+          {usable.length > OFFERED && (
+            <Text component="li" c="dimmed" fz="small" p="8px 12px">
+              Keep typing to narrow the list.
+            </Text>
+          )}
+        </ul>
+      )}
+      {donor?.best && (
+        <Aside tone="good" fz="small" className="numbers">
+          Best: flight {donor.best.trial_number} on {donor.vehicle.title}:{" "}
+          <strong>
+            <GainList gains={donor.best.gains} experiment={experiment} />
+          </strong>
+          , error {plusMinus(donor.best.mean, donor.best.standard_error, unit)}
+          {donor.best.standard_error === null ? "" : " (± standard error)"}. The first flight uses these gains and shows
+          whether the vehicles are similar enough to build on that campaign's results.
+        </Aside>
+      )}
     </Stack>
-  );
-}
-
-interface OffersProps {
-  campaigns: readonly CampaignSummary[];
-  /** Whether these are all that there are. */
-  isAll: boolean;
-  onChoose: (campaign: CampaignSummary) => void;
-}
-
-function Offers({ campaigns, isAll, onChoose }: OffersProps) {
-  if (campaigns.length === 0) {
-    return (
-      <p role="status">
-        {isAll
-          ? "No campaign of this experiment has a valid flight yet."
-          : "No campaigns match. Only campaigns of this experiment with a valid flight are listed."}
-      </p>
-    );
-  }
-  return (
-    <ul className={classes["offers"]} aria-label="Campaigns to start from">
-      {campaigns.slice(0, OFFERED).map((campaign) => (
-        <li key={campaign.id}>
-          <UnstyledButton className={classes["offer"] ?? ""} onClick={() => onChoose(campaign)}>
-            {campaign.name} · {campaign.vehicle.title}
-          </UnstyledButton>
-        </li>
-      ))}
-      {campaigns.length > OFFERED && <li className={classes["rest"]}>Keep typing to narrow the list.</li>}
-    </ul>
-  );
-}
-
-interface TakenProps {
-  donor: CampaignSummary;
-  best: NonNullable<CampaignSummary["best"]>;
-  experiment: string;
-}
-
-function Taken({ donor, best, experiment }: TakenProps) {
-  const unit = useUnits(experiment).error;
-  return (
-    <Aside tone="good" fz="small" className="numbers">
-      Best: flight {best.trial_number} on {donor.vehicle.title}:{" "}
-      <strong>
-        <GainList gains={best.gains} experiment={experiment} />
-      </strong>
-      , error {plusMinus(best.mean, best.standard_error, unit)}
-      {best.standard_error === null ? "" : " (± standard error)"}. The first flight uses these gains and shows whether
-      the vehicles are similar enough to build on that campaign's results.
-    </Aside>
   );
 }

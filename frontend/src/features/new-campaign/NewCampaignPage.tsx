@@ -1,42 +1,32 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, SimpleGrid, TextInput } from "@mantine/core";
+import { useForm } from "@mantine/form";
 import { IconPlus } from "@tabler/icons-react";
-import { useEffect, useState } from "react";
 import { useNavigate, useSearchParams } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
-import { reasonsByField, standingProblem } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
-import type { Catalogue, Vehicle } from "../../api/types";
+import type { Catalogue, NewCampaign, Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
 import { Aside } from "../../ui/Aside";
 import { SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FoldedSection, FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
-import { FormErrorNotice } from "../../ui/Notices";
+import { FoldedSection, FormPage, GainFields, MissingEntries, RequestForm } from "../../ui/FormPage";
 import { offeredExperiments } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
 import { DonorPicker } from "./DonorPicker";
+import { advancedTitle, fieldsOf, unreadable } from "./fields";
 import {
-  advancedTitle,
   type CampaignForm,
-  fieldsOf,
-  flyingOther,
   gainsOf,
-  inUnitsOfForm,
-  kindsFor,
-  LABELS,
   presetOf,
-  registeredFor,
   requestFrom,
   type StartKind,
   startingForm,
   startsFor,
   strategiesFor,
-  unreadable,
   withExperiment,
   withPreset,
   withRegistered,
-  withVehicle,
 } from "./newCampaign";
 import { VehiclePicker } from "./VehiclePicker";
 
@@ -64,9 +54,6 @@ export function NewCampaignPage() {
   );
 }
 
-const ENTER_NAME = "Enter a name.";
-const CHOOSE_VEHICLE = "Choose a vehicle.";
-const CHOOSE_CAMPAIGN = "Choose a campaign.";
 const NO_PRESET = { value: "", label: "Own settings" };
 
 const STARTS: Record<StartKind, string> = {
@@ -82,48 +69,60 @@ interface FormProps {
   wanted: Vehicle | undefined;
 }
 
+/** What is not chosen or entered yet, by field. */
+function missingFrom({ name, vehicle, definition: { start } }: CampaignForm): Record<string, string> {
+  return {
+    ...(name.trim() === "" ? { name: "Enter a name." } : {}),
+    ...(vehicle.kind === "" ? { "vehicle.kind": "Choose a vehicle." } : {}),
+    ...(start.kind === "campaign" && start.donor === null ? { "definition.start.donor": "Choose a campaign." } : {}),
+  };
+}
+
 function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
-  const [form, setForm] = useState<CampaignForm>(() => {
-    const start = startingForm(catalogue);
-    return wanted === undefined ? start : withRegistered(start, catalogue, wanted);
+  const form = useForm<CampaignForm, NewCampaign>({
+    initialValues:
+      wanted === undefined ? startingForm(catalogue) : withRegistered(startingForm(catalogue), catalogue, wanted),
+    transformValues: (values) => requestFrom(values, catalogue),
   });
   const navigate = useNavigate();
   const create = useCreateCampaign();
-  const { plain, advanced } = fieldsOf(form, catalogue);
-  const labels = { ...plain, ...advanced };
-  const request = requestFrom(form, catalogue);
-  const problem = standingProblem(create.error, create.variables, request);
-  const reasons = inUnitsOfForm(reasonsByField(problem, Object.keys(labels)));
-  useEffect(() => {
-    if (create.error) document.querySelector<HTMLElement>('main [aria-invalid="true"]')?.focus();
-  }, [create.error]);
+  const { registered, definition } = form.values;
+  const { plain, advanced } = fieldsOf(form.values, catalogue);
+  const missing = missingFrom(form.values);
+  const field = (path: string) => ({
+    label: plain[path],
+    ...form.getInputProps(path),
+    error: missing[path] ?? form.errors[path],
+  });
 
-  const refusedBelow = Object.keys(advanced).some((field) => reasons[field] !== undefined);
-  const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
-  const preset = presetOf(form, catalogue);
+  const preset = presetOf(form.values, catalogue);
   const presets = catalogue.presets.map(({ name, title }) => ({ value: name, label: title }));
-  const strategies = strategiesFor(catalogue, form.experiment);
-  const strategy = strategies.find(({ name }) => name === form.strategy);
-  const recommended = strategies[0]?.name;
-  const unread = unreadable(form, catalogue);
-  const isNamed = form.name.trim() !== "";
-  const lacksDonor = form.start === "campaign" && form.donor === null;
-  const lacksVehicle = form.vehicle === "";
-  const missing = [
-    ...(isNamed ? [] : [ENTER_NAME]),
-    ...(lacksVehicle ? [CHOOSE_VEHICLE] : []),
-    ...(lacksDonor ? [CHOOSE_CAMPAIGN] : []),
-  ];
-  const isUnreadBelow = unread.some((label) => !(label in form.startGains));
-  const isReal = vehicles.some(({ id, is_real }) => id === form.registered?.id && is_real);
+  const strategies = strategiesFor(catalogue, definition.experiment);
+  const strategy = strategies.find(({ name }) => name === definition.strategy);
+  const unread = unreadable(form.values, (path) => form.getInputProps(path).value, catalogue);
+  const isWrongBelow =
+    unread.some((label) => !(label in definition.start.gains)) ||
+    Object.keys(advanced).some((path) => path in form.errors);
   return (
-    <form
-      noValidate
-      className={classes["form"]}
-      onSubmit={(event) => {
-        event.preventDefault();
-        create.mutate(request, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
-      }}
+    <RequestForm
+      form={form}
+      labels={{ ...plain, ...advanced }}
+      request={create}
+      onDone={({ id }) => void navigate(`/campaigns/${id}`)}
+      actions={
+        <div className={classes["create"]}>
+          <MissingEntries numbers={unread} texts={Object.values(missing)} />
+          <Button
+            type="submit"
+            size="lg"
+            disabled={unread.length > 0 || Object.keys(missing).length > 0}
+            loading={create.isPending}
+            leftSection={<IconPlus size={22} aria-hidden />}
+          >
+            Create campaign
+          </Button>
+        </div>
+      }
     >
       <SelectField
         label="Preset"
@@ -132,92 +131,58 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         value={preset?.name ?? NO_PRESET.value}
         onChange={(value) => {
           const chosen = catalogue.presets.find(({ name }) => name === value);
-          if (chosen !== undefined) setForm(withPreset(form, catalogue, chosen));
+          if (chosen !== undefined) form.setValues(withPreset(form.values, catalogue, chosen));
         }}
       />
       {catalogue.experiments.length > 1 && (
         <SelectField
-          label={LABELS["definition.experiment"]}
+          {...field("definition.experiment")}
           data={offeredExperiments(catalogue).map(({ name, title }) => ({ value: name, label: title }))}
-          value={form.experiment}
-          error={reasons["definition.experiment"]}
-          onChange={(value) => setForm(withExperiment(form, catalogue, value))}
+          onChange={(value) => form.setValues(withExperiment(form.values, catalogue, value))}
         />
       )}
       <VehiclePicker
-        kinds={kindsFor(catalogue, form.experiment)}
-        registered={registeredFor(vehicles, form.experiment)}
-        others={flyingOther(vehicles, form.experiment)}
-        kind={form.vehicle}
-        vehicleId={form.registered?.id ?? null}
-        error={lacksVehicle ? CHOOSE_VEHICLE : (reasons["vehicle.kind"] ?? reasons["vehicle.id"])}
-        onKind={(kind) => setForm(withVehicle(form, catalogue, kind))}
-        onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
+        form={form.values}
+        catalogue={catalogue}
+        vehicles={vehicles}
+        error={field("vehicle.kind").error ?? form.errors["vehicle.id"]}
+        onChange={form.setValues}
       />
-      {isReal && (
+      {registered?.is_real && (
         <Aside tone="warn">
-          {form.registered?.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
+          {registered.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
           simulation, which you start from the campaign page.
         </Aside>
       )}
-      <TextInput
-        label={LABELS.name}
-        value={form.name}
-        maxLength={120}
-        error={isNamed ? reasons["name"] : ENTER_NAME}
-        onChange={(event) => set({ name: event.currentTarget.value })}
-      />
-      <div className={classes["pair"]}>
+      <TextInput {...field("name")} maxLength={120} />
+      <SimpleGrid minColWidth={260} autoFlow="auto-fit" spacing={16} style={{ alignItems: "start" }}>
         <SelectField
-          label={LABELS["start.kind"]}
-          data={startsFor(catalogue, form.experiment).map((value) => ({ value, label: STARTS[value] }))}
-          value={form.start}
-          error={reasons["start.kind"]}
-          onChange={(value) => set({ start: value })}
+          {...field("definition.start.kind")}
+          data={startsFor(catalogue, definition.experiment).map((value) => ({ value, label: STARTS[value] }))}
         />
         <SelectField
-          label={LABELS.strategy}
-          description={`${strategies.length > 1 && form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
+          {...field("definition.strategy")}
+          description={`${strategies.length > 1 && strategy === strategies[0] ? "Recommended. " : ""}${strategy?.line ?? ""}`}
           data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
-          value={form.strategy}
-          error={reasons["strategy"]}
-          onChange={(value) => set({ strategy: value, strategyOptions: {} })}
+          onChange={(value) => {
+            form.setFieldValue("definition.strategy", value);
+            form.setFieldValue("definition.options", {});
+          }}
         />
-      </div>
-      {form.start === "campaign" && (
-        <DonorPicker
-          experiment={form.experiment}
-          donor={form.donor}
-          error={lacksDonor ? CHOOSE_CAMPAIGN : reasons["start.donor"]}
-          onChange={(donor) => set({ donor })}
-        />
+      </SimpleGrid>
+      {definition.start.kind === "campaign" && (
+        <DonorPicker experiment={definition.experiment} {...field("definition.start.donor")} />
       )}
-      {form.start === "given" && (
+      {definition.start.kind === "given" && (
         <GainFields
           legend="Start gains"
-          gains={gainsOf(catalogue, form.experiment)}
-          values={form.startGains}
-          reasons={reasons}
-          prefix="start.gains"
-          onChange={(startGains) => set({ startGains })}
+          gains={gainsOf(catalogue, definition.experiment)}
+          input={(name) => form.getInputProps(`definition.start.gains.${name}`)}
         />
       )}
-      <FoldedSection title={advancedTitle(form, catalogue)} forcedOpen={refusedBelow || isUnreadBelow}>
-        <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
+      <FoldedSection title={advancedTitle(form.values, catalogue)} forcedOpen={isWrongBelow}>
+        <AdvancedFields form={form} catalogue={catalogue} />
       </FoldedSection>
-      <FormErrorNotice error={problem} labels={labels} />
-      <div className={classes["create"]}>
-        <MissingEntries numbers={unread} texts={missing} />
-        <Button
-          type="submit"
-          size="lg"
-          disabled={unread.length > 0 || missing.length > 0}
-          loading={create.isPending}
-          leftSection={<IconPlus size={22} aria-hidden />}
-        >
-          Create campaign
-        </Button>
-      </div>
-    </form>
+    </RequestForm>
   );
 }

@@ -1,67 +1,70 @@
-import { Anchor, Button, Input } from "@mantine/core";
-import type { ReactNode } from "react";
+import { Anchor, Button, Group, Input, Radio, SimpleGrid, Text } from "@mantine/core";
+import { type ReactNode, useId } from "react";
 import { Link } from "react-router";
-import { useCatalogue } from "../../api/queries";
-import type { Vehicle, VehicleKindInfo } from "../../api/types";
+import type { Catalogue, Vehicle } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
 import { autopilotTitle } from "../fleet/fleet";
 import { VehicleStateBadge } from "../fleet/VehicleStateBadge";
 import classes from "./NewCampaign.module.css";
+import { type CampaignForm, kindsFor, registeredFor, withRegistered, withVehicle } from "./newCampaign";
 
 interface Props {
-  kinds: readonly VehicleKindInfo[];
-  registered: readonly Vehicle[];
-  /** Registered vehicles of other experiments; selecting one changes the experiment. */
-  others: readonly Vehicle[];
-  kind: string;
-  vehicleId: number | null;
-  error: string | undefined;
-  onKind: (kind: string) => void;
-  onVehicle: (vehicle: Vehicle) => void;
+  form: CampaignForm;
+  catalogue: Catalogue;
+  vehicles: readonly Vehicle[];
+  error: ReactNode;
+  onChange: (form: CampaignForm) => void;
 }
 
-/** Selection of a registered vehicle or a shared simulation. */
-export function VehiclePicker({ kinds, registered, others, kind, vehicleId, error, onKind, onVehicle }: Props) {
-  const { data: catalogue } = useCatalogue();
+/** Selection of a registered vehicle or a shared simulation. A vehicle of another experiment changes the experiment. */
+export function VehiclePicker({ form, catalogue, vehicles, error, onChange }: Props) {
+  const { registered: chosen, vehicle, definition } = form;
+  const fitting = registeredFor(vehicles, definition.experiment);
+  const others = vehicles.filter((one) => one.registered && !fitting.includes(one));
+  const choose = (one: Vehicle): void => onChange(withRegistered(form, catalogue, one));
   return (
     <div>
       <Input.Wrapper size="md" label="Vehicle" labelElement="div" error={error}>
-        <div role="radiogroup" aria-label="Vehicle" className={classes["cards"]}>
-          {registered.map((vehicle) => (
+        <SimpleGrid minColWidth={210} autoFlow="auto-fit" spacing={12} mt={6} role="radiogroup" aria-label="Vehicle">
+          {fitting.map((one) => (
             <VehicleOption
-              key={vehicle.id}
-              isReal={vehicle.is_real}
-              checked={vehicle.id === vehicleId}
-              name={vehicle.name}
-              line={autopilotTitle(catalogue, vehicle)}
-              onChoose={() => onVehicle(vehicle)}
+              key={one.id}
+              isReal={one.is_real}
+              checked={one.id === chosen?.id}
+              name={one.name}
+              line={autopilotTitle(catalogue, one)}
+              onChoose={() => choose(one)}
             >
-              <VehicleStateBadge vehicle={vehicle} />
+              <VehicleStateBadge vehicle={one} />
             </VehicleOption>
           ))}
-          {kinds.map(({ name, title, line, is_real }) => (
+          {kindsFor(catalogue, definition.experiment).map(({ name, title, line, is_real }) => (
             <VehicleOption
               key={name}
               isReal={is_real}
-              checked={vehicleId === null && name === kind}
+              checked={chosen === null && name === vehicle.kind}
               name={title}
               line={line}
-              onChoose={() => onKind(name)}
+              onChoose={() => onChange(withVehicle(form, catalogue, name))}
             />
           ))}
-        </div>
+        </SimpleGrid>
       </Input.Wrapper>
-      <div className={classes["more"]}>
-        {others.length > 0 && <span>Vehicles that fly another experiment (choosing one changes it):</span>}
-        {others.map((vehicle) => (
-          <Button key={vehicle.id} variant="default" onClick={() => onVehicle(vehicle)}>
-            {vehicle.name}
+      <Group gap="4px 12px" mt={8}>
+        {others.length > 0 && (
+          <Text span c="dimmed">
+            Vehicles that fly another experiment (choosing one changes it):
+          </Text>
+        )}
+        {others.map((one) => (
+          <Button key={one.id} variant="default" onClick={() => choose(one)}>
+            {one.name}
           </Button>
         ))}
-        <Anchor component={Link} to="/vehicles/new">
+        <Anchor component={Link} to="/vehicles/new" lh="44px">
           Register a vehicle
         </Anchor>
-      </div>
+      </Group>
     </div>
   );
 }
@@ -76,14 +79,17 @@ interface OptionProps {
 }
 
 function VehicleOption({ isReal, checked, name, line, onChoose, children }: OptionProps) {
+  const id = useId();
   return (
-    <label className={classes["card"]}>
-      <span className={classes["top"]}>
+    <label htmlFor={id} className={classes["card"]}>
+      <Group justify="space-between">
         <VehicleBadge isReal={isReal} />
-        <input type="radio" name="vehicle" checked={checked} onChange={onChoose} />
-      </span>
+        <Radio id={id} size="md" name="vehicle" checked={checked} onChange={onChoose} />
+      </Group>
       <strong>{name}</strong>
-      <span className={classes["line"]}>{line}</span>
+      <Text span c="dimmed" fz="small" lh="inherit">
+        {line}
+      </Text>
       {children}
     </label>
   );

@@ -33,7 +33,7 @@ const THEMES = [
   { value: "light", label: "Light" },
   { value: "dark", label: "Dark" },
   { value: "auto", label: "System" },
-] as const;
+];
 
 /** Preferences of this browser, and information about the server. */
 export function SettingsPage() {
@@ -41,10 +41,10 @@ export function SettingsPage() {
   const system = useSystem();
   return (
     <>
-      <Group justify="space-between" gap={12} mb={14}>
-        <Title order={1}>Settings</Title>
-      </Group>
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)">
+      <Title order={1} mb={14}>
+        Settings
+      </Title>
+      <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
         <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
           <Panel title="This browser">
             <ThisBrowser />
@@ -58,7 +58,15 @@ export function SettingsPage() {
           </div>
         ) : (
           <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
-            <RemoteAccess system={system.data} />
+            <Panel title="Open on a tablet">
+              <Stack gap={18}>
+                {system.data.addresses.length > 0 ? (
+                  <Reachable system={system.data} />
+                ) : (
+                  <LocalOnly system={system.data} />
+                )}
+              </Stack>
+            </Panel>
             <Backup system={system.data} />
           </Stack>
         )}
@@ -81,7 +89,7 @@ function ThisBrowser() {
         <SegmentedControl
           aria-labelledby="appearance"
           size="md"
-          data={[...THEMES]}
+          data={THEMES}
           value={colorScheme}
           onChange={(value) => setColorScheme(value as typeof colorScheme)}
         />
@@ -162,9 +170,9 @@ function Backup({ system }: { system: System }) {
           </Button>
         </div>
         <ErrorNotice error={backup.error} />
-        <details className={classes["details"]}>
+        <details>
           <summary>How to restore a backup</summary>
-          <ol>
+          <ol className={classes["steps"]}>
             <li>Stop Gainline.</li>
             <li>
               In {system.data_dir}, delete gainline.sqlite3-wal and gainline.sqlite3-shm, and move gainline.sqlite3 to
@@ -180,16 +188,6 @@ function Backup({ system }: { system: System }) {
 }
 
 /** How to open this dashboard on another device, and the security consequences. */
-function RemoteAccess({ system }: { system: System }) {
-  return (
-    <Panel title="Open on a tablet">
-      <Stack gap={18}>
-        {system.addresses.length > 0 ? <Reachable system={system} /> : <LocalOnly system={system} />}
-      </Stack>
-    </Panel>
-  );
-}
-
 function Reachable({ system: { addresses, exposes, host, in_container } }: { system: System }) {
   const urls = addresses.map(({ url }) => url);
   const [chosen, setChosen] = useState(urls[0] ?? "");
@@ -203,17 +201,17 @@ function Reachable({ system: { addresses, exposes, host, in_container } }: { sys
           data={addresses.map(({ url, interface: name }) => ({ value: url, label: `${name}: ${url}` }))}
         />
       )}
-      <div className={classes["code"]}>
-        <img src={codeOf(chosen)} alt={`QR code of ${chosen}`} width={220} height={220} />
-        <Note>
+      <Group gap={18}>
+        <img src={codeOf(chosen)} alt={`QR code of ${chosen}`} width={220} height={220} className={classes["code"]} />
+        <Note flex="1 1 230px">
           Scan the code with the tablet’s camera, or enter
-          <Anchor href={chosen} className={classes["address"] ?? ""}>
+          <Anchor href={chosen} display="block" py={12} fz="title" fw={650} style={{ overflowWrap: "anywhere" }}>
             {chosen}
           </Anchor>
           Both devices must be on the same network. The tablet has read-only access. To change campaigns and fly
           simulations from it, open the link that <code>gainline unlock</code> prints on this computer.
         </Note>
-      </div>
+      </Group>
       {in_container && (
         <Note>
           Gainline runs in a container, and this is the container’s address. If the tablet cannot reach it, use the
@@ -227,6 +225,7 @@ function Reachable({ system: { addresses, exposes, host, in_container } }: { sys
   );
 }
 
+/** Why no other device can open it. */
 function LocalOnly({ system: { exposes, host, is_exposed } }: { system: System }) {
   if (is_exposed) {
     return <Note>The server listens on {host}, but this computer is not connected to a network.</Note>;
