@@ -1,4 +1,4 @@
-import { Button, Group, Stack, Title, useComputedColorScheme } from "@mantine/core";
+import { Box, Button, Group, Stack, Text, Title, useComputedColorScheme } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
@@ -7,6 +7,7 @@ import {
   comparisonFigure,
   curvesCsv,
   type FlightComparison,
+  paramsOf,
   useComparison,
   useComparisonFigure,
 } from "../../api/compare";
@@ -17,13 +18,14 @@ import { loadPlotly } from "../../charts/plotly";
 import type { PlotlyFigure } from "../../charts/traces";
 import { Aside, toneOf } from "../../ui/Aside";
 import { count } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
+import { toggled } from "../../ui/toggled";
 import { useTitle } from "../../ui/useTitle";
-import classes from "./Compare.module.css";
 import { ComparisonTable, lineStylesOf, SettingsTable } from "./ComparisonTable";
-import { againstFirst, chosenIn, paramsOf, remember, remembered, toggled, withoutRefused } from "./chosenFlights";
+import { againstFirst, chosenIn, remember, remembered, withoutRefused } from "./chosenFlights";
 import { FlightPicker } from "./FlightPicker";
 
 /** The flights in the URL; a URL without flights restores those stored in this tab. */
@@ -62,8 +64,9 @@ export function ComparePage() {
           </Button>
         )}
       </Group>
-      <div className={classes["layout"]}>
-        <Stack gap="var(--gap)" miw={0}>
+      {/* The list of flights is below the comparison, or left of it where both have room. */}
+      <Group align="start" gap="var(--gap)" style={{ flexDirection: "row-reverse" }}>
+        <Stack gap="var(--gap)" miw={0} flex="999 1 700px">
           {chosen.length === 0 && <Introduction />}
           {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
           {problem !== null && chosen.length > 1 && (
@@ -85,12 +88,14 @@ export function ComparePage() {
           )}
           {comparison.isPending && chosen.length > 1 && <div style={{ height: 480 }} aria-busy="true" />}
         </Stack>
-        <FlightPicker
-          chosen={chosen}
-          from={from > 0 ? from : null}
-          onToggle={(trial) => choose(toggled(chosen, trial))}
-        />
-      </div>
+        <Box flex="1 1 340px" miw={0}>
+          <FlightPicker
+            chosen={chosen}
+            from={from > 0 ? from : null}
+            onToggle={(trial) => choose(toggled(chosen, trial))}
+          />
+        </Box>
+      </Group>
     </>
   );
 }
@@ -146,12 +151,16 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
   return (
     <>
       <section aria-label="Verdict">
-        <Aside tone={toneOf(verdict)} className={classes["verdict"] ?? ""}>
+        <Aside tone={toneOf(verdict)} display="flex" style={{ gap: 10 }}>
           <Icon size={24} aria-hidden />
           <div role="status">
-            <p>{sentence}</p>
+            <Text fz="strong" maw="90ch">
+              {sentence}
+            </Text>
             {notes.map((note) => (
-              <p key={note}>{note}</p>
+              <Note key={note} mt={4} fz="body" maw="90ch">
+                {note}
+              </Note>
             ))}
           </div>
         </Aside>
@@ -172,9 +181,9 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
         />
         <SettingsTable comparison={comparison} />
         {sentences.length > 1 && first !== undefined && (
-          <details className={classes["words"]}>
+          <details>
             <summary>Comparisons with {first.label}</summary>
-            <ul>
+            <ul className={work["notes"]}>
               {sentences.map((one) => (
                 <li key={one}>{one}</li>
               ))}

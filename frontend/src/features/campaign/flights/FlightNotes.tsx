@@ -1,4 +1,4 @@
-import { Button, FileButton, Group, InputBase } from "@mantine/core";
+import { ActionIcon, Button, FileButton, Group, InputBase, Stack } from "@mantine/core";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../../api/records";
@@ -30,53 +30,59 @@ export function FlightNotes({ trial, pin = null }: Props) {
   const [hasDraft] = useState(() => draftOf(trial.id, trial.note) !== trial.note);
   const kept = hasDraft || trial.note !== "" || photos.length > 0 || pin !== null;
   return (
-    <details className={classes["notes"]} open={kept || undefined}>
+    <details style={{ width: "100%" }} open={kept || undefined}>
       <summary>Note and photos</summary>
-      {/* The key keeps unsaved text when a review changes the trial's version. */}
-      <Note key={`${trial.id} ${trial.note}`} trial={trial} pin={pin} />
-      {photos.length > 0 && (
-        <ul className={classes["photos"]}>
-          {photos.map(({ id }, index) => (
-            <li key={id}>
-              <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
-                <img src={photoAddress(trial.id, id)} alt={`Flight ${trial.number}, ${index + 1}`} loading="lazy" />
-              </a>
-              <button
-                type="button"
-                aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
-                aria-expanded={id === asked}
-                onClick={() => setAsked(id === asked ? null : id)}
-              >
-                <IconTrash size={18} aria-hidden />
-              </button>
-            </li>
-          ))}
-        </ul>
-      )}
-      {asked !== null && doomed >= 0 && (
-        <Group gap={8}>
-          <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
-          <Button variant="default" onClick={() => setAsked(null)}>
-            Cancel
-          </Button>
-          <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
-            Delete photo {doomed + 1}
-          </Button>
-        </Group>
-      )}
-      <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
-        {(props) => (
-          <Button
-            {...props}
-            variant="default"
-            loading={add.isPending}
-            leftSection={<IconCamera size={20} aria-hidden />}
-          >
-            Add photo
-          </Button>
+      <Stack gap={10} align="start">
+        {/* The key keeps unsaved text when a review changes the trial's version. */}
+        <Note key={`${trial.id} ${trial.note}`} trial={trial} pin={pin} />
+        {photos.length > 0 && (
+          <ul className={classes["photos"]}>
+            {photos.map(({ id }, index) => (
+              <li key={id}>
+                <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
+                  <img src={photoAddress(trial.id, id)} alt={`Flight ${trial.number}, ${index + 1}`} loading="lazy" />
+                </a>
+                <ActionIcon
+                  variant="default"
+                  pos="absolute"
+                  right={0}
+                  bottom={0}
+                  c={id === asked ? "var(--bad)" : undefined}
+                  aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
+                  aria-expanded={id === asked}
+                  onClick={() => setAsked(id === asked ? null : id)}
+                >
+                  <IconTrash size={18} aria-hidden />
+                </ActionIcon>
+              </li>
+            ))}
+          </ul>
         )}
-      </FileButton>
-      <ErrorNotice error={add.error ?? remove.error ?? error} />
+        {asked !== null && doomed >= 0 && (
+          <Group gap={8}>
+            <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
+            <Button variant="default" onClick={() => setAsked(null)}>
+              Cancel
+            </Button>
+            <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
+              Delete photo {doomed + 1}
+            </Button>
+          </Group>
+        )}
+        <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
+          {(props) => (
+            <Button
+              {...props}
+              variant="default"
+              loading={add.isPending}
+              leftSection={<IconCamera size={20} aria-hidden />}
+            >
+              Add photo
+            </Button>
+          )}
+        </FileButton>
+        <ErrorNotice error={add.error ?? remove.error ?? error} />
+      </Stack>
     </details>
   );
 }
@@ -107,6 +113,7 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
         ref={text}
         description="A line that starts with a time, such as “2.4 s: wobble”, is marked on the record chart."
         multiline
+        w="100%"
         label={`Note on flight ${trial.number}`}
         rows={2}
         error={isTooLong}

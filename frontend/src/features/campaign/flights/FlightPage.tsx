@@ -12,7 +12,6 @@ import { useTitle } from "../../../ui/useTitle";
 import { GateChecks } from "../proposal/Gate";
 import { VerdictPanel } from "../verdict/VerdictPanel";
 import type { NotePin } from "./FlightNotes";
-import classes from "./FlightPage.module.css";
 import { useFlightKeys } from "./useFlightKeys";
 
 export function FlightPage() {
@@ -64,7 +63,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
       <Title order={1} mb={12}>
         Flight {number}
       </Title>
-      <div className={classes["record"]}>
+      {/* Panels one below the other, as many as channels were recorded. */}
+      <Box style={{ "--tallest": "400vw" }}>
         <FigurePanel
           title="Record"
           card={figure.data}
@@ -84,7 +84,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
             )
           }
         />
-      </div>
+      </Box>
       <Box mt="var(--gap)">
         <VerdictPanel
           trial={trial.data}

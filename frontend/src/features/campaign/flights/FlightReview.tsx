@@ -1,8 +1,9 @@
-import { Button, Chip, Stack, Text, TextInput } from "@mantine/core";
+import { Button, Chip, Group, Stack, Text, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useClassify, useJudgeAbort } from "../../../api/mutations";
 import { problemOf, reasonsByField } from "../../../api/problems";
 import type { Campaign, Trial } from "../../../api/types";
+import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
 import classes from "./FlightReview.module.css";
 import {
@@ -33,17 +34,21 @@ export function FlightReview({ trial, trials, campaign }: Props) {
   const classify = useClassify();
   const isEndedByRule = campaign?.state === "finished" && campaign.outcome !== "stopped";
   const suggestion = suggestedClass(trial);
-  const others = otherClasses(trial).sort((one, other) => rank(one, suggestion) - rank(other, suggestion));
+  const isSuggested = (outcome: Suggestion["outcome"]) => outcome === suggestion?.outcome;
+  const standsOut = (outcome: Suggestion["outcome"]) =>
+    isSuggested(outcome) || (suggestion === null && outcome !== "invalid" && trial.state !== "invalid");
+  const others = otherClasses(trial).sort((one, other) => Number(isSuggested(other)) - Number(isSuggested(one)));
   if (others.length === 0) return null;
 
   function choose(outcome: Suggestion["outcome"]): void {
-    const suggested = suggestion?.outcome === outcome ? suggestion.why : "";
-    if (outcome === "invalid" && suggested === "") {
+    if (outcome !== "invalid") {
+      const word = trial.state === "invalid" ? "restored by the operator" : "reviewed by the operator";
+      classify.mutate({ trial, outcome, reason: word });
+    } else if (suggestion?.outcome === outcome) {
+      classify.mutate({ trial, outcome, reason: suggestion.why });
+    } else {
       setAsking(true);
-      return;
     }
-    const word = trial.state === "invalid" ? "restored by the operator" : "reviewed by the operator";
-    classify.mutate({ trial, outcome, reason: outcome === "invalid" ? suggested : word });
   }
 
   if (asking) {
@@ -51,25 +56,25 @@ export function FlightReview({ trial, trials, campaign }: Props) {
     return (
       <form
         ref={showWhole}
-        className={classes["classify"]}
+        className={classes["question"]}
         onSubmit={(event) => {
           event.preventDefault();
           classify.mutate({ trial, outcome: "invalid", reason });
         }}
       >
-        <p>
+        <Note fz="body">
           The record of an invalid flight is kept, but not used for any computation.{" "}
           <strong>{consequenceOf(trial, trials, "invalid")}</strong>
           {isEndedByRule && " The campaign reopens if its stop rule is no longer met."} Why is it invalid?
-        </p>
+        </Note>
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
-          <div className={classes["chips"]}>
+          <Group gap={8}>
             {INVALID_REASONS.map((one) => (
-              <Chip key={one} value={one} size="sm" variant="outline">
+              <Chip key={one} value={one} variant="outline" styles={{ label: { height: 48 } }}>
                 {one}
               </Chip>
             ))}
-          </div>
+          </Group>
         </Chip.Group>
         <TextInput
           label="Reason"
@@ -78,14 +83,14 @@ export function FlightReview({ trial, trials, campaign }: Props) {
           error={refused}
           onChange={(event) => setReason(event.currentTarget.value)}
         />
-        <div className={classes["answers"]}>
+        <Group gap={8} grow preventGrowOverflow={false}>
           <Button type="submit" color="red" disabled={reason.trim() === ""} loading={classify.isPending}>
             Mark invalid
           </Button>
           <Button variant="default" onClick={() => setAsking(false)}>
             Cancel
           </Button>
-        </div>
+        </Group>
         <ErrorNotice error={classify.error} shown={["reason"]} />
       </form>
     );
@@ -101,7 +106,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
       {others.map((outcome) => (
         <Button
           key={outcome}
-          variant={standsOut(outcome, trial, suggestion) ? "filled" : "default"}
+          variant={standsOut(outcome) ? "filled" : "default"}
           loading={classify.isPending}
           title={consequenceOf(trial, trials, outcome)}
           onClick={() => choose(outcome)}
@@ -114,14 +119,6 @@ export function FlightReview({ trial, trials, campaign }: Props) {
   );
 }
 
-const rank = (outcome: Suggestion["outcome"], suggestion: Suggestion | null): number =>
-  outcome === suggestion?.outcome ? 0 : 1;
-
-function standsOut(outcome: Suggestion["outcome"], trial: Trial, suggestion: Suggestion | null): boolean {
-  if (suggestion !== null) return outcome === suggestion.outcome;
-  return outcome !== "invalid" && trial.state !== "invalid";
-}
-
 const LABELS = { "behaved badly": "Vehicle behaviour", "something else": "Other cause" } as const;
 
 /** Whether an aborted flight counts against its gains, with buttons for the cause. */
@@ -131,8 +128,10 @@ export function AbortCause({ trial }: { trial: Trial }) {
   const sentence = abortSentence(trial);
   if (sentence === "") return null;
   return (
-    <section className={classes["abortCause"]} aria-label="Abort cause">
-      <p role="status">{sentence}</p>
+    <section className={classes["question"]} aria-label="Abort cause">
+      <Text role="status" fz="body" lh={1.4}>
+        {sentence}
+      </Text>
       {causes.length > 0 && (
         <Stack gap={8}>
           {trial.abort_cause !== "operator" && <small>Change the cause to:</small>}

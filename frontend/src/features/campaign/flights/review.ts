@@ -7,21 +7,17 @@ import { bestOfCounted } from "../verdict/verdict";
 
 type AbortWord = "behaved badly" | "something else";
 
+const ABORTS = {
+  limit: "A limit was exceeded: the flight counts against its gains.",
+  operator: "Why was the flight aborted? It counts against its gains only if the cause was the vehicle's behaviour.",
+  "behaved badly": "Aborted because of the vehicle's behaviour: the flight counts against its gains.",
+  "something else": "Aborted for another cause: the flight does not count against its gains.",
+  unknown: "Abort cause not recorded: the flight counts against its gains.",
+} as const;
+
 /** Whether an aborted flight counts against its gains; empty for other flights. */
 export function abortSentence({ state, abort_cause: cause }: Pick<Trial, "state" | "abort_cause">): string {
-  if (state !== "aborted") return "";
-  switch (cause) {
-    case "limit":
-      return "A limit was exceeded: the flight counts against its gains.";
-    case "operator":
-      return "Why was the flight aborted? It counts against its gains only if the cause was the vehicle's behaviour.";
-    case "behaved badly":
-      return "Aborted because of the vehicle's behaviour: the flight counts against its gains.";
-    case "something else":
-      return "Aborted for another cause: the flight does not count against its gains.";
-    default:
-      return "Abort cause not recorded: the flight counts against its gains.";
-  }
+  return state === "aborted" ? ABORTS[cause ?? "unknown"] : "";
 }
 
 /** Causes that the operator can select: those other than the current one. */
@@ -71,14 +67,13 @@ export function otherClasses(trial: Trial): ("valid" | "aborted" | "invalid")[] 
   switch (trial.state) {
     case "valid":
     case "aborted":
+    case "lost":
       return ["invalid"];
     case "invalid":
       if (trial.flight?.state === "aborted") return ["aborted"];
       return trial.may_be_valid ? ["valid"] : [];
     case "captured":
       return trial.may_be_valid ? ["valid", "aborted", "invalid"] : ["aborted", "invalid"];
-    case "lost":
-      return ["invalid"];
     default:
       return [];
   }
