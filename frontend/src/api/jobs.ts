@@ -63,7 +63,7 @@ export function useReproductionFigure(name: string, figure: string, theme: Theme
 }
 
 /** A request that changes jobs. */
-function useJobMutation<Asked, Answer>(mutationFn: (asked: Asked) => Promise<Answer>) {
+function useJobMutation<Variables, Answer>(mutationFn: (variables: Variables) => Promise<Answer>) {
   const queries = useQueryClient();
   const onSettled = () =>
     Promise.all(["jobs", "reproductions"].map((key) => queries.invalidateQueries({ queryKey: [key] })));

@@ -146,7 +146,7 @@ function Title<Row>({ column, sorted, onSort }: TitleProps<Row>) {
   const Icon = sorted === "desc" ? IconArrowDown : IconArrowUp;
   return (
     <th scope="col" className={classOf(column)} aria-sort={sorted ? ORDERS[sorted] : undefined}>
-      <span className={hidesTitle ? "visually-hidden" : classes["title"]}>
+      <span className={hidesTitle ? "visually-hidden" : onSort && classes["title"]}>
         {onSort === undefined ? (
           title
         ) : (
@@ -154,7 +154,7 @@ function Title<Row>({ column, sorted, onSort }: TitleProps<Row>) {
             {title}
             {sorted && <Icon size={15} aria-hidden />}
           </UnstyledButton>
-        )}
+        )}{" "}
         {topic && <HelpTip topic={topic} />}
       </span>
       {detail && <small>{detail}</small>}

@@ -11,7 +11,7 @@ import {
   useComparison,
   useComparisonFigure,
 } from "../../api/compare";
-import { type Problem, problemOf } from "../../api/problems";
+import { problemOf } from "../../api/problems";
 import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { loadPlotly } from "../../charts/plotly";
@@ -67,22 +67,30 @@ export function ComparePage() {
       {/* The list of flights is below the comparison, or left of it where both have room. */}
       <Group align="start" gap="var(--gap)" style={{ flexDirection: "row-reverse" }}>
         <Stack gap="var(--gap)" miw={0} flex="999 1 700px">
-          {chosen.length === 0 && <Introduction />}
+          {chosen.length === 0 && (
+            <section className={work["teach"]}>
+              <p>
+                <strong>Compare flights</strong> of one or more campaigns: which gains are better, with what confidence,
+                and which settings differ.
+              </p>
+              <p>
+                Select two or more flights. The first is the reference. To share the selection, copy the URL of this
+                page.
+              </p>
+            </section>
+          )}
           {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
-          {problem !== null && chosen.length > 1 && (
+          {problem !== null && chosen.length > kept.length && (
             <div>
-              {kept.length < chosen.length ? (
-                <FailureNotice reason={refusalText(problem)} />
-              ) : (
-                <ErrorNotice error={comparison.error} />
-              )}
-              {kept.length < chosen.length && (
-                <Button variant="default" mt={10} onClick={() => choose(kept)}>
-                  Remove {count(chosen.length - kept.length, "flight")}
-                </Button>
-              )}
+              <FailureNotice
+                reason={`These flights cannot be compared: ${problem.problems.map(({ reason }) => reason).join("; ")}.`}
+              />
+              <Button variant="default" mt={10} onClick={() => choose(kept)}>
+                Remove {count(chosen.length - kept.length, "flight")}
+              </Button>
             </div>
           )}
+          {chosen.length > 1 && chosen.length === kept.length && <ErrorNotice error={problem} />}
           {comparison.data !== undefined && chosen.length > 1 && (
             <Compared comparison={comparison.data} trials={chosen} choose={choose} />
           )}
@@ -97,22 +105,6 @@ export function ComparePage() {
         </Box>
       </Group>
     </>
-  );
-}
-
-function refusalText({ problems }: Problem): string {
-  return `These flights cannot be compared: ${problems.map(({ reason }) => reason).join("; ")}.`;
-}
-
-function Introduction() {
-  return (
-    <section className={work["teach"]}>
-      <p>
-        <strong>Compare flights</strong> of one or more campaigns: which gains are better, with what confidence, and
-        which settings differ.
-      </p>
-      <p>Select two or more flights. The first is the reference. To share the selection, copy the URL of this page.</p>
-    </section>
   );
 }
 
@@ -197,7 +189,6 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
 
 type Format = "png" | "svg";
 
-const FORMATS: readonly Format[] = ["png", "svg"];
 const SIZE = { width: 1280, height: 800 } as const;
 
 /** Save the figure in the light theme on white, for documents. */
@@ -224,7 +215,7 @@ function SaveComparison({ trials, stem }: { trials: readonly number[]; stem: str
       >
         CSV
       </Button>
-      {FORMATS.map((format) => (
+      {(["png", "svg"] as const).map((format) => (
         <Button
           key={format}
           variant="default"

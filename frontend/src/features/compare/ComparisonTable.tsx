@@ -112,21 +112,17 @@ function Name({ flight, several, pen }: { flight: ComparedFlight; several: boole
 }
 
 function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: ComparedFlight; unit: string }) {
-  if (error === null || group === null) return <>{NOTHING}</>;
-  if (group.n === 1) {
-    return (
-      <>
-        <strong>{plusMinus(error, scatter, unit)}</strong>
-        {scatter !== null && <small>± flight-to-flight scatter</small>}
-      </>
-    );
-  }
+  if (error === null || group === null) return NOTHING;
+  const remark =
+    group.n === 1
+      ? scatter !== null && "± flight-to-flight scatter"
+      : `mean of ${group.n}; this flight ${error.toFixed(3)} ${unit}`;
   return (
     <>
-      <strong>{plusMinus(group.mean, group.standard_error, unit)}</strong>
-      <small>
-        mean of {group.n}; this flight {error.toFixed(3)} {unit}
-      </small>
+      <strong>
+        {group.n === 1 ? plusMinus(error, scatter, unit) : plusMinus(group.mean, group.standard_error, unit)}
+      </strong>
+      {remark && <small>{remark}</small>}
     </>
   );
 }

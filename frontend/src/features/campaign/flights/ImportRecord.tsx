@@ -18,10 +18,7 @@ const ACCEPT = { confirm: "Import with the gains in the log", invalid: "Store as
 
 /** Upload of the record of a flight made elsewhere with these gains. */
 export function ImportRecord({ upload, trialId, plan }: Props) {
-  const target = {
-    ...(trialId === undefined ? {} : { trialId }),
-    ...(plan === undefined ? {} : { plan }),
-  };
+  const target = { trialId, plan };
   const problem = problemOf(upload.error);
   const accepting = confirmationIn(problem);
   const again = (answer: Partial<RecordOrder>) =>
