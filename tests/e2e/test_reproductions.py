@@ -49,7 +49,7 @@ def test_long_lists_of_jobs_come_in_pages(open_dashboard: Opener, empty_server: 
     total = dashboard.get("/jobs")["total"]
     assert total > 20
     dashboard.open("/jobs")
-    jobs = dashboard.page.locator("tbody[data-state]")
+    jobs = dashboard.page.locator("tbody tr[data-state]")
     expect(jobs).to_have_count(20)
     dashboard.button(f"Show more (20 of {total})").click()
     expect(jobs).to_have_count(total)

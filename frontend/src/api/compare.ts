@@ -29,5 +29,11 @@ export function useComparisonFigure(trials: readonly number[], theme: Theme) {
   });
 }
 
-export const curvesCsv = (trials: readonly number[]): string =>
-  `/api/compare/curves.csv?${trials.map((trial) => `trial=${trial}`).join("&")}`;
+/** The flights in an address, of which the first is the reference, and the campaign whose flights are listed first. */
+export function paramsOf(trials: readonly number[], campaign: number | string | null = null): URLSearchParams {
+  const params = new URLSearchParams(campaign === null ? {} : { campaign: String(campaign) });
+  for (const trial of trials) params.append("trial", String(trial));
+  return params;
+}
+
+export const curvesCsv = (trials: readonly number[]): string => `/api/compare/curves.csv?${paramsOf(trials)}`;

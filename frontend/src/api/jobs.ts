@@ -15,7 +15,7 @@ import {
 } from "./generated";
 import type { Theme } from "./queries";
 
-export type { Job, JobState, LogLine, ReproductionSummary, Row as ReproductionRow } from "./generated";
+export type { Job, JobState, ReproductionSummary, Row as ReproductionRow } from "./generated";
 
 export const JOBS_PAGE = 20;
 
@@ -62,33 +62,19 @@ export function useReproductionFigure(name: string, figure: string, theme: Theme
   });
 }
 
-function useSettled(): () => Promise<unknown> {
+/** A request that changes jobs. */
+function useJobMutation<Variables, Answer>(mutationFn: (variables: Variables) => Promise<Answer>) {
   const queries = useQueryClient();
-  return () =>
-    Promise.all([
-      queries.invalidateQueries({ queryKey: ["jobs"] }),
-      queries.invalidateQueries({ queryKey: ["reproductions"] }),
-    ]);
+  const onSettled = () =>
+    Promise.all(["jobs", "reproductions"].map((key) => queries.invalidateQueries({ queryKey: [key] })));
+  return useMutation({ mutationFn, onSettled });
 }
 
-export function useRunReproduction() {
-  return useMutation({
-    mutationFn: ({ name, full = false }: { name: string; full?: boolean }) =>
-      answer(runReproduction({ path: { name }, body: { full } })),
-    onSettled: useSettled(),
-  });
-}
+export const useRunReproduction = () =>
+  useJobMutation(({ name, full = false }: { name: string; full?: boolean }) =>
+    answer(runReproduction({ path: { name }, body: { full } })),
+  );
 
-export function useCancelJob() {
-  return useMutation({
-    mutationFn: (jobId: number) => answer(cancelJob({ path: { job_id: jobId } })),
-    onSettled: useSettled(),
-  });
-}
+export const useCancelJob = () => useJobMutation((job_id: number) => answer(cancelJob({ path: { job_id } })));
 
-export function useRetryJob() {
-  return useMutation({
-    mutationFn: (jobId: number) => answer(retryJob({ path: { job_id: jobId } })),
-    onSettled: useSettled(),
-  });
-}
+export const useRetryJob = () => useJobMutation((job_id: number) => answer(retryJob({ path: { job_id } })));

@@ -23,8 +23,7 @@ export function recordOf(files: readonly File[]): RecordFiles | null {
   const isCompanion = (file: File): boolean => file.name.toLowerCase().endsWith(".log");
   const file = files.find((one) => !isCompanion(one)) ?? files[0];
   if (file === undefined) return null;
-  const companion = files.find((one) => one !== file && isCompanion(one));
-  return { file, ...(companion === undefined ? {} : { companion }) };
+  return { file, companion: files.find((one) => one !== file && isCompanion(one)) };
 }
 
 /** The takeoffs of a log from which the server requests a choice. */

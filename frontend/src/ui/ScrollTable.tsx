@@ -1,20 +1,28 @@
-import type { ReactNode } from "react";
+import type { ComponentProps } from "react";
 import classes from "./ScrollTable.module.css";
 
-interface Props {
+export interface TableFrame extends ComponentProps<"section"> {
   label: string;
-  className?: string | undefined;
+  /** Of the table. */
+  className?: string;
   /** Whether a long table scrolls under its head instead of making the page longer. */
   framed?: boolean;
-  children: ReactNode;
+  /** In px, in place of what its rows need. */
+  height?: number;
 }
 
-/** Table in a region that scrolls sideways where the screen is too narrow. `className` is the table's. */
-export function ScrollTable({ label, className = "", framed = false, children }: Props) {
-  const region = `${classes["scroll"]} ${framed ? classes["framed"] : ""} sideways`;
+/** Table in a region that scrolls sideways where the screen is too narrow. */
+export function ScrollTable({ label, className = "", framed, height, children, ...region }: TableFrame) {
+  const isFramed = framed || height !== undefined;
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={region} aria-label={label} tabIndex={0}>
+    <section
+      {...region}
+      className={`${classes["scroll"]} ${isFramed ? classes["framed"] : ""} sideways`}
+      style={{ height, maxHeight: height }}
+      aria-label={label}
+      // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+      tabIndex={0}
+    >
       <table className={`${classes["table"]} ${className}`}>{children}</table>
     </section>
   );

@@ -1,6 +1,6 @@
 import { type InfiniteData, InfiniteQueryObserver, QueryClient } from "@tanstack/react-query";
 import { expect, test } from "vitest";
-import { addPage, lastRows } from "./paging";
+import { addPage } from "./paging";
 
 type Numbers = InfiniteData<number, number>;
 
@@ -58,10 +58,4 @@ test("an answer that fails ends it", async () => {
   const failed = { ...list.getCurrentResult(), isError: true } as const;
   await addPage({ ...failed, fetchNextPage: () => Promise.resolve(failed as never) });
   expect(pages()).toEqual([1]);
-});
-
-test("a long table shows its last rows and, before them, the ones that matter", () => {
-  const rows = [1, 2, 3, 4, 5, 6];
-  expect(lastRows(rows, 2, (row) => row === 3)).toEqual([3, 5, 6]);
-  expect(lastRows(rows, 6, () => false)).toBe(rows);
 });

@@ -141,7 +141,7 @@ function CampaignView({ campaign }: { campaign: Campaign }) {
             <ByFlightPanels campaignId={campaign.id} preview={preview} onChoose={choose} />
           </SimpleGrid>
         </Tabs.Panel>
-        <Tabs.Panel value="flights" keepMounted>
+        <Tabs.Panel value="flights" keepMounted pt="var(--gap)">
           <FlightsPanel
             campaign={campaign}
             trials={read ?? null}

@@ -1,4 +1,4 @@
-import { Button, Group, Stack, Title, useComputedColorScheme } from "@mantine/core";
+import { Box, Button, Group, Stack, Text, Title, useComputedColorScheme } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
@@ -7,23 +7,25 @@ import {
   comparisonFigure,
   curvesCsv,
   type FlightComparison,
+  paramsOf,
   useComparison,
   useComparisonFigure,
 } from "../../api/compare";
-import { type Problem, problemOf } from "../../api/problems";
+import { problemOf } from "../../api/problems";
 import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { loadPlotly } from "../../charts/plotly";
 import type { PlotlyFigure } from "../../charts/traces";
 import { Aside, toneOf } from "../../ui/Aside";
 import { count } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
+import { toggled } from "../../ui/toggled";
 import { useTitle } from "../../ui/useTitle";
-import classes from "./Compare.module.css";
 import { ComparisonTable, lineStylesOf, SettingsTable } from "./ComparisonTable";
-import { againstFirst, chosenIn, paramsOf, remember, remembered, toggled, withoutRefused } from "./chosenFlights";
+import { againstFirst, chosenIn, remember, remembered, withoutRefused } from "./chosenFlights";
 import { FlightPicker } from "./FlightPicker";
 
 /** The flights in the URL; a URL without flights restores those stored in this tab. */
@@ -62,52 +64,47 @@ export function ComparePage() {
           </Button>
         )}
       </Group>
-      <div className={classes["layout"]}>
-        <Stack gap="var(--gap)" miw={0}>
-          {chosen.length === 0 && <Introduction />}
+      {/* The list of flights is below the comparison, or left of it where both have room. */}
+      <Group align="start" gap="var(--gap)" style={{ flexDirection: "row-reverse" }}>
+        <Stack gap="var(--gap)" miw={0} flex="999 1 700px">
+          {chosen.length === 0 && (
+            <section className={work["teach"]}>
+              <p>
+                <strong>Compare flights</strong> of one or more campaigns: which gains are better, with what confidence,
+                and which settings differ.
+              </p>
+              <p>
+                Select two or more flights. The first is the reference. To share the selection, copy the URL of this
+                page.
+              </p>
+            </section>
+          )}
           {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
-          {problem !== null && chosen.length > 1 && (
+          {problem !== null && chosen.length > kept.length && (
             <div>
-              {kept.length < chosen.length ? (
-                <FailureNotice reason={refusalText(problem)} />
-              ) : (
-                <ErrorNotice error={comparison.error} />
-              )}
-              {kept.length < chosen.length && (
-                <Button variant="default" mt={10} onClick={() => choose(kept)}>
-                  Remove {count(chosen.length - kept.length, "flight")}
-                </Button>
-              )}
+              <FailureNotice
+                reason={`These flights cannot be compared: ${problem.problems.map(({ reason }) => reason).join("; ")}.`}
+              />
+              <Button variant="default" mt={10} onClick={() => choose(kept)}>
+                Remove {count(chosen.length - kept.length, "flight")}
+              </Button>
             </div>
           )}
+          {chosen.length > 1 && chosen.length === kept.length && <ErrorNotice error={problem} />}
           {comparison.data !== undefined && chosen.length > 1 && (
             <Compared comparison={comparison.data} trials={chosen} choose={choose} />
           )}
           {comparison.isPending && chosen.length > 1 && <div style={{ height: 480 }} aria-busy="true" />}
         </Stack>
-        <FlightPicker
-          chosen={chosen}
-          from={from > 0 ? from : null}
-          onToggle={(trial) => choose(toggled(chosen, trial))}
-        />
-      </div>
+        <Box flex="1 1 340px" miw={0}>
+          <FlightPicker
+            chosen={chosen}
+            from={from > 0 ? from : null}
+            onToggle={(trial) => choose(toggled(chosen, trial))}
+          />
+        </Box>
+      </Group>
     </>
-  );
-}
-
-function refusalText({ problems }: Problem): string {
-  return `These flights cannot be compared: ${problems.map(({ reason }) => reason).join("; ")}.`;
-}
-
-function Introduction() {
-  return (
-    <section className={work["teach"]}>
-      <p>
-        <strong>Compare flights</strong> of one or more campaigns: which gains are better, with what confidence, and
-        which settings differ.
-      </p>
-      <p>Select two or more flights. The first is the reference. To share the selection, copy the URL of this page.</p>
-    </section>
   );
 }
 
@@ -146,12 +143,16 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
   return (
     <>
       <section aria-label="Verdict">
-        <Aside tone={toneOf(verdict)} className={classes["verdict"] ?? ""}>
+        <Aside tone={toneOf(verdict)} display="flex" style={{ gap: 10 }}>
           <Icon size={24} aria-hidden />
           <div role="status">
-            <p>{sentence}</p>
+            <Text fz="strong" maw="90ch">
+              {sentence}
+            </Text>
             {notes.map((note) => (
-              <p key={note}>{note}</p>
+              <Note key={note} mt={4} fz="body" maw="90ch">
+                {note}
+              </Note>
             ))}
           </div>
         </Aside>
@@ -172,9 +173,9 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
         />
         <SettingsTable comparison={comparison} />
         {sentences.length > 1 && first !== undefined && (
-          <details className={classes["words"]}>
+          <details>
             <summary>Comparisons with {first.label}</summary>
-            <ul>
+            <ul className={work["notes"]}>
               {sentences.map((one) => (
                 <li key={one}>{one}</li>
               ))}
@@ -188,7 +189,6 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
 
 type Format = "png" | "svg";
 
-const FORMATS: readonly Format[] = ["png", "svg"];
 const SIZE = { width: 1280, height: 800 } as const;
 
 /** Save the figure in the light theme on white, for documents. */
@@ -215,7 +215,7 @@ function SaveComparison({ trials, stem }: { trials: readonly number[]; stem: str
       >
         CSV
       </Button>
-      {FORMATS.map((format) => (
+      {(["png", "svg"] as const).map((format) => (
         <Button
           key={format}
           variant="default"

@@ -1,4 +1,4 @@
-import { ActionIcon, Anchor } from "@mantine/core";
+import { ActionIcon, Anchor, Group, Text } from "@mantine/core";
 import { IconArrowBarToUp, IconX } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
@@ -7,9 +7,8 @@ import type { FigureCard } from "../../api/types";
 import type { PlotlyFigure } from "../../charts/traces";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { count, gainText, NOTHING, sharesText } from "../../ui/format";
-import { HelpTip } from "../../ui/HelpTip";
+import { type Column, ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
-import { ScrollTable } from "../../ui/ScrollTable";
 import { trialStateLabel } from "../../ui/states";
 import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
@@ -30,69 +29,52 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
   const { flights, gains, pairs, error_unit: unit } = comparison;
   const [first] = flights;
   if (first === undefined) return null;
-  const measures = flights.some(hasStepResponse) ? MEASURES : [];
   const several = flights.some(({ campaign_id }) => campaign_id !== first.campaign_id);
+  const columns: Column<ComparedFlight>[] = [
+    {
+      title: "Flight",
+      isHeading: true,
+      cell: (flight) => <Name flight={flight} several={several} pen={pens.get(flight.trial_id)} />,
+    },
+    { title: "Error", cell: (flight) => <ErrorCell flight={flight} unit={unit} /> },
+    {
+      title: `Against ${first.label}`,
+      cell: ({ trial_id }) => (
+        <Against pair={againstFirst(pairs, first.trial_id, trial_id)} first={first.label} unit={unit} />
+      ),
+    },
+    ...(flights.some(hasStepResponse) ? MEASURES : []).map((measure) => ({
+      title: measure.title,
+      topic: measure.topic,
+      cell: (flight: ComparedFlight) => measureText(flight, measure),
+    })),
+    ...gains.map((difference) => ({
+      title: settingTitle(difference),
+      cell: (flight: ComparedFlight) => <Value difference={difference} index={flights.indexOf(flight)} />,
+    })),
+    {
+      title: "Actions",
+      hidesTitle: true,
+      cell: (flight) => (
+        <>
+          {flight !== first && (
+            <Act title={`Use ${flight.name} as reference`} onClick={() => onFirst(flight.trial_id)}>
+              <IconArrowBarToUp size={20} color="var(--dim)" />
+            </Act>
+          )}
+          <Act title={`Remove ${flight.name}`} onClick={() => onRemove(flight.trial_id)}>
+            <IconX size={20} color="var(--dim)" />
+          </Act>
+        </>
+      ),
+    },
+  ];
   return (
-    <ScrollTable label="Flights compared" className={classes["table"]}>
-      <thead>
-        <tr>
-          <th scope="col">Flight</th>
-          <th scope="col">Error</th>
-          <th scope="col">Against {first.label}</th>
-          {measures.map(({ name, title, topic }) => (
-            <th key={name} scope="col">
-              {title} <HelpTip topic={topic} />
-            </th>
-          ))}
-          {gains.map(({ title, unit: of }) => (
-            <th key={`${title} ${of}`} scope="col">
-              {title}
-              {of && ` (${of})`}
-            </th>
-          ))}
-          <th scope="col">
-            <span className="visually-hidden">Actions</span>
-          </th>
-        </tr>
-      </thead>
-      <tbody>
-        {flights.map((flight, index) => (
-          <tr key={flight.trial_id}>
-            <th scope="row">
-              <Name flight={flight} several={several} pen={pens.get(flight.trial_id)} />
-            </th>
-            <td>
-              <ErrorCell flight={flight} unit={unit} />
-            </td>
-            <td>
-              <Against pair={againstFirst(pairs, first.trial_id, flight.trial_id)} first={first.label} unit={unit} />
-            </td>
-            {measures.map((measure) => (
-              <td key={measure.name}>{measureText(flight, measure)}</td>
-            ))}
-            {gains.map((difference) => (
-              <td key={`${difference.title} ${difference.unit}`}>
-                <Value difference={difference} index={index} />
-              </td>
-            ))}
-            <td>
-              <span className={classes["acts"]}>
-                {index > 0 && (
-                  <Act title={`Use ${flight.name} as reference`} onClick={() => onFirst(flight.trial_id)}>
-                    <IconArrowBarToUp size={20} color="var(--dim)" />
-                  </Act>
-                )}
-                <Act title={`Remove ${flight.name}`} onClick={() => onRemove(flight.trial_id)}>
-                  <IconX size={20} color="var(--dim)" />
-                </Act>
-              </span>
-            </td>
-          </tr>
-        ))}
-      </tbody>
-    </ScrollTable>
+    <ListTable label="Flights compared" columns={columns} rows={flights} keyOf={({ trial_id }) => String(trial_id)} />
   );
 }
+
+const settingTitle = ({ title, unit }: FlightDifference): string => (unit ? `${title} (${unit})` : title);
 
 function Act({ title, onClick, children }: { title: string; onClick: () => void; children: ReactNode }) {
   return (
@@ -105,71 +87,73 @@ function Act({ title, onClick, children }: { title: string; onClick: () => void;
 function Name({ flight, several, pen }: { flight: ComparedFlight; several: boolean; pen: LineStyle | undefined }) {
   const { label, number, campaign_id, trial_id, campaign_name, is_real, state, flown_at } = flight;
   return (
-    <span className={classes["name"]}>
-      <span className={classes["key"]}>
-        {label}
-        {pen && <LineSample pen={pen} />}
-      </span>
+    <Group gap={10} wrap="nowrap" align="start">
+      {label}
+      {pen && <LineSample pen={pen} />}
       <span>
         <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`}>
           Flight {number}
         </Anchor>
-        {several && <small className={`${classes["small"]} ${classes["campaignName"]}`}>{campaign_name}</small>}
-        <small className={classes["small"]}>
+        {several && (
+          <Text component="small" fz="fine" c="dimmed" maw={170} style={{ whiteSpace: "normal" }}>
+            {campaign_name}
+          </Text>
+        )}
+        <small>
           <VehicleBadge isReal={is_real} />
         </small>
-        <small className={classes["small"]}>
+        <small>
           <Time at={flown_at} />
         </small>
         {state !== "valid" && <StateBadge words={trialStateLabel(state)} />}
       </span>
-    </span>
+    </Group>
   );
 }
 
 function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: ComparedFlight; unit: string }) {
-  if (error === null || group === null) return <>{NOTHING}</>;
-  if (group.n === 1) {
-    return (
-      <>
-        <strong>{plusMinus(error, scatter, unit)}</strong>
-        {scatter !== null && <small className={classes["small"]}>± flight-to-flight scatter</small>}
-      </>
-    );
-  }
+  if (error === null || group === null) return NOTHING;
+  const remark =
+    group.n === 1
+      ? scatter !== null && "± flight-to-flight scatter"
+      : `mean of ${group.n}; this flight ${error.toFixed(3)} ${unit}`;
   return (
     <>
-      <strong>{plusMinus(group.mean, group.standard_error, unit)}</strong>
-      <small className={classes["small"]}>
-        mean of {group.n}; this flight {error.toFixed(3)} {unit}
-      </small>
+      <strong>
+        {group.n === 1 ? plusMinus(error, scatter, unit) : plusMinus(group.mean, group.standard_error, unit)}
+      </strong>
+      {remark && <small>{remark}</small>}
     </>
   );
 }
 
 const UNJUDGED = { gains: "", repeats: "Same gains", apart: "No verdict", "no error": "Not scored" } as const;
 
+const COLOURS = { better: "var(--best)", worse: "var(--bad)", unresolved: "", "not known yet": "" } as const;
+
 function Against({ pair, first, unit }: { pair: FlightPair | null; first: string; unit: string }) {
-  if (pair === null) return <small className={classes["small"]}>reference</small>;
+  if (pair === null) return <small>reference</small>;
   const { verdict, basis, difference, standard_error, confidence, further } = pair;
   const same = basis === "repeats" && verdict !== null ? "Same gains, " : "";
   const word = verdict === null ? UNJUDGED[basis] : VERDICTS[verdict];
   return (
     <>
-      <strong data-verdict={verdict ?? undefined}>{same ? same + word.toLowerCase() : word}</strong>
+      <strong style={{ color: verdict === null ? undefined : COLOURS[verdict] }}>
+        {same ? same + word.toLowerCase() : word}
+      </strong>
       {difference !== null && (
-        <small className={classes["small"]}>
+        <small>
           {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
           {basis === "repeats" && ", these two flights"}
         </small>
       )}
       {confidence !== null && (
-        <small className={classes["small"]}>
+        <small>
           {confidenceText(confidence)} confidence{verdict === null ? " of a change" : ""}
         </small>
       )}
       {further && (
-        <small className={classes["small"]}>
+        <small>
           needs more flights:{" "}
           {sharesText([further.trial, "with its gains"], [further.against, `with those of ${first}`])}
         </small>
@@ -183,26 +167,22 @@ function changeText(change: number): string {
   return change > 0 ? `+${gainText(change)}` : gainText(change);
 }
 
-interface ValueProps {
-  difference: Pick<FlightDifference, "values" | "changes">;
-  index: number;
-}
-
-function Value({ difference: { values, changes }, index }: ValueProps) {
+function Value({ difference: { values, changes }, index }: { difference: FlightDifference; index: number }) {
   const value = values[index] ?? null;
   const change = changes[index] ?? null;
   return (
     <>
       {value === null ? NOTHING : typeof value === "number" ? gainText(value) : String(value)}
-      {index > 0 && change !== null && change !== 0 && <small className={classes["small"]}>{changeText(change)}</small>}
+      {index > 0 && change !== null && change !== 0 && <small>{changeText(change)}</small>}
     </>
   );
 }
 
 /** Settings that differ: a row for each setting, a column for each flight. */
 export function SettingsTable({ comparison: { flights, settings } }: { comparison: FlightComparison }) {
-  const everywhere = settings.filter(({ values }) => values.every((value) => value !== null));
-  const somewhere = settings.filter((setting) => !everywhere.includes(setting));
+  const isEverywhere = ({ values }: FlightDifference) => !values.includes(null);
+  const everywhere = settings.filter(isEverywhere);
+  const somewhere = settings.filter((setting) => !isEverywhere(setting));
   return (
     <>
       {settings.length === 0 && (
@@ -210,7 +190,7 @@ export function SettingsTable({ comparison: { flights, settings } }: { compariso
       )}
       {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
       {somewhere.length > 0 && (
-        <details className={classes["words"]}>
+        <details>
           <summary>{count(somewhere.length, "setting")} present in only some flights</summary>
           <Settings flights={flights} settings={somewhere} title="Settings present in only some flights" />
         </details>
@@ -226,34 +206,15 @@ interface SettingsProps {
 }
 
 function Settings({ flights, settings, title }: SettingsProps) {
+  const columns: Column<FlightDifference>[] = [
+    { title, isHeading: true, cell: settingTitle },
+    ...flights.map(({ label }, index) => ({
+      title: label,
+      cell: (setting: FlightDifference) => <Value difference={setting} index={index} />,
+    })),
+  ];
   return (
-    <ScrollTable label={title} className={`${classes["table"]} ${classes["settings"]}`}>
-      <thead>
-        <tr>
-          <th scope="col">{title}</th>
-          {flights.map(({ trial_id, label }) => (
-            <th key={trial_id} scope="col">
-              {label}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody>
-        {settings.map(({ title: name, unit, values, changes }) => (
-          <tr key={`${name} ${unit}`}>
-            <th scope="row">
-              {name}
-              {unit && ` (${unit})`}
-            </th>
-            {flights.map(({ trial_id }, index) => (
-              <td key={trial_id}>
-                <Value difference={{ values, changes }} index={index} />
-              </td>
-            ))}
-          </tr>
-        ))}
-      </tbody>
-    </ScrollTable>
+    <ListTable label={title} className={classes["settings"]} columns={columns} rows={settings} keyOf={settingTitle} />
   );
 }
 
@@ -286,7 +247,7 @@ export function lineStylesOf(card: FigureCard | undefined): Map<number, LineStyl
 /** Sample of a flight's line in the figure. */
 function LineSample({ pen }: { pen: LineStyle }) {
   return (
-    <svg width="44" height="12" aria-hidden>
+    <svg width="44" height="22" viewBox="0 -5 44 22" aria-hidden>
       <line x1="1" y1="6" x2="43" y2="6" stroke={pen.colour} strokeWidth="3" strokeDasharray={DASHES[pen.dash]} />
     </svg>
   );

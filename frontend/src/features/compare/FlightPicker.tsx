@@ -1,4 +1,4 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Text, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -14,21 +14,19 @@ import { useUnits } from "../../ui/units";
 import classes from "./Compare.module.css";
 import { MOST_FLIGHTS } from "./chosenFlights";
 
-interface Props {
+interface Ticks {
   chosen: readonly number[];
   onToggle: (trial: number) => void;
-  /** The originating campaign, shown first and expanded. */
-  from: number | null;
 }
 
-/** Campaigns by name, with checkboxes for their flights. */
-export function FlightPicker({ chosen, onToggle, from }: Props) {
+/** Campaigns by name, with checkboxes for their flights; the one that the page was opened from first and expanded. */
+export function FlightPicker({ from, ...ticks }: Ticks & { from: number | null }) {
   const [search, setSearch] = useState("");
   const [sought] = useDebouncedValue(search.trim(), 200);
   const campaigns = useCampaigns({ search: sought, state: [], vehicle: [], sort: "-updated" });
+  const origin = useCampaign(from);
   const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
   const flown = found.filter(({ flights, id }) => flights > 0 && id !== from);
-  const full = chosen.length >= MOST_FLIGHTS;
   return (
     <Panel title="Select flights">
       <TextInput
@@ -38,11 +36,22 @@ export function FlightPicker({ chosen, onToggle, from }: Props) {
         value={search}
         onChange={(event) => setSearch(event.currentTarget.value)}
       />
-      {full && <Note mt={10}>At most {MOST_FLIGHTS} flights can be compared at once.</Note>}
-      <ErrorNotice error={campaigns.error} />
-      {from !== null && sought === "" && <From campaignId={from} chosen={chosen} onToggle={onToggle} />}
+      {ticks.chosen.length >= MOST_FLIGHTS && (
+        <Note mt={10}>At most {MOST_FLIGHTS} flights can be compared at once.</Note>
+      )}
+      <ErrorNotice error={campaigns.error ?? origin.error} />
+      {origin.data && sought === "" && (
+        <Campaign
+          id={origin.data.id}
+          name={origin.data.name}
+          flights={origin.data.trials.flown}
+          experiment={origin.data.definition.experiment ?? "takeoff"}
+          open
+          {...ticks}
+        />
+      )}
       {flown.map(({ id, name, experiment, flights }) => (
-        <Campaign key={id} id={id} title={name} flights={flights} {...{ experiment, chosen, onToggle }} />
+        <Campaign key={id} {...{ id, name, flights, experiment }} {...ticks} />
       ))}
       {campaigns.data && flown.length === 0 && from === null && (
         <Note mt={10}>
@@ -58,52 +67,39 @@ export function FlightPicker({ chosen, onToggle, from }: Props) {
   );
 }
 
-interface Ticks {
-  chosen: readonly number[];
-  onToggle: (trial: number) => void;
-}
-
-function From({ campaignId, ...ticks }: Ticks & { campaignId: number }) {
-  const campaign = useCampaign(campaignId);
-  if (campaign.data === undefined) return <ErrorNotice error={campaign.error} />;
-  const { name, definition, trials } = campaign.data;
-  return (
-    <Campaign
-      id={campaignId}
-      title={name}
-      flights={trials.flown}
-      experiment={definition.experiment ?? "takeoff"}
-      open
-      {...ticks}
-    />
-  );
-}
-
 interface CampaignProps extends Ticks {
   id: number;
-  title: string;
+  name: string;
   flights: number;
   experiment: string;
   open?: boolean;
 }
 
-function Campaign({ id, title, flights, experiment, open = false, chosen, onToggle }: CampaignProps) {
+function Campaign({ name, flights, open = false, ...listed }: CampaignProps) {
   const [opened, setOpened] = useState(open);
   return (
     <details
       className={classes["campaign"]}
       open={opened}
-      onToggle={(event) => setOpened((event.currentTarget as HTMLDetailsElement).open)}
+      onToggle={({ currentTarget }) => setOpened(currentTarget.open)}
     >
       <summary>
-        <span>{title}</span> <small className={classes["dim"]}>{count(flights, "flight")}</small>
+        {name}
+        <Text component="small" c="dimmed" fz="fine" ml="auto" pl={6}>
+          {count(flights, "flight")}
+        </Text>
       </summary>
-      {opened && <Flights campaignId={id} {...{ experiment, chosen, onToggle }} />}
+      {opened && <Flights {...listed} />}
     </details>
   );
 }
 
-function Flights({ campaignId, experiment, chosen, onToggle }: Ticks & { campaignId: number; experiment: string }) {
+function Flights({
+  id: campaignId,
+  experiment,
+  chosen,
+  onToggle,
+}: Pick<CampaignProps, "id" | "experiment" | keyof Ticks>) {
   const trials = useTrials(campaignId);
   const unit = useUnits(experiment).error;
   if (trials.data === undefined) return <ErrorNotice error={trials.error} />;
@@ -123,7 +119,7 @@ function Flights({ campaignId, experiment, chosen, onToggle }: Ticks & { campaig
               <span>
                 <strong>Flight {number}</strong>{" "}
                 {error === null ? trialStateLabel(state).word.toLowerCase() : withUnit(error, unit)}{" "}
-                <small className={classes["dim"]}>{gainsInBrackets(gains)}</small>
+                <small>{gainsInBrackets(gains)}</small>
               </span>
             </label>
           </li>

@@ -1,15 +1,11 @@
 import { expect, test } from "vitest";
-import { chosenIn, paramsOf, toggled, withoutRefused } from "./chosenFlights";
+import { paramsOf } from "../../api/compare";
+import { chosenIn, withoutRefused } from "./chosenFlights";
 
 test("an address holds the flights in their order, each once, and nothing that is no flight", () => {
   expect(chosenIn(new URLSearchParams("trial=8&trial=3&trial=8&trial=x&trial=-1&campaign=4"))).toEqual([8, 3]);
   expect(chosenIn(paramsOf([8, 3], null))).toEqual([8, 3]);
   expect(paramsOf([8, 3], "4").toString()).toBe("campaign=4&trial=8&trial=3");
-});
-
-test("a flight is taken in at the end and left out again", () => {
-  expect(toggled([8, 3], 5)).toEqual([8, 3, 5]);
-  expect(toggled([8, 3, 5], 3)).toEqual([8, 5]);
 });
 
 test("what a refusal names is left out by its place", () => {

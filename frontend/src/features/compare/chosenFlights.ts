@@ -15,12 +15,6 @@ export function chosenIn(params: URLSearchParams): number[] {
   return idsIn(params.getAll("trial"));
 }
 
-/** The URL of these flights, and of the campaign whose flights are listed first. */
-export function paramsOf(trials: readonly number[], campaign: string | null): URLSearchParams {
-  const listed: [string, string][] = campaign === null ? [] : [["campaign", campaign]];
-  return new URLSearchParams([...listed, ...trials.map((trial): [string, string] => ["trial", String(trial)])]);
-}
-
 export function remember(trials: readonly number[]): void {
   sessionStorage.setItem(KEY, trials.join(" "));
 }
@@ -29,15 +23,9 @@ export function remembered(): number[] {
   return idsIn((sessionStorage.getItem(KEY) ?? "").split(" "));
 }
 
-/** Remove the flight if it is selected, otherwise append it. */
-export function toggled(trials: readonly number[], trial: number): number[] {
-  return trials.includes(trial) ? trials.filter((one) => one !== trial) : [...trials, trial];
-}
-
 /** The flights that are not refused by name (`trial.2`). */
 export function withoutRefused(trials: readonly number[], problem: Problem | null): number[] {
-  const refused = new Set(problem?.problems.map(({ field }) => field));
-  return trials.filter((_, index) => !refused.has(`trial.${index}`));
+  return trials.filter((_, index) => !problem?.problems.some(({ field }) => field === `trial.${index}`));
 }
 
 /** Comparison of a flight with the first; null for the first itself. */

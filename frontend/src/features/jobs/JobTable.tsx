@@ -1,19 +1,17 @@
 import { Anchor, Box, Button, Text } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 import { Link } from "react-router";
-import { type Job, type LogLine, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
+import { type Job, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
 import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import { count, utcTime } from "../../ui/format";
+import { type Column, ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
-import row from "../../ui/RowCard.module.css";
-import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
+import { toggled } from "../../ui/toggled";
 import classes from "./Jobs.module.css";
-import { between, isUnderWay, jobLink, jobStateLabel, jobTitle, progressText } from "./jobs";
-
-const COLUMNS = ["Job", "Campaign", "State", "Requested", "Duration", "Actions"] as const;
+import { between, isUnderWay, jobTitle, progressText, STATE_LABELS } from "./jobs";
 
 interface JobTableProps {
   label: string;
@@ -22,92 +20,100 @@ interface JobTableProps {
   titles: ReadonlyMap<string, string>;
 }
 
+/** Jobs: what each is, its campaign, state and times; below them its progress, failure and log, if any. */
 export function JobTable({ label, jobs, titles }: JobTableProps) {
-  return (
-    <ScrollTable label={label} className={classes["jobs"]}>
-      <thead>
-        <tr>
-          {COLUMNS.map((column) => (
-            <th key={column} scope="col">
-              {column === "Actions" ? <span className="visually-hidden">{column}</span> : column}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      {jobs.map((job) => (
-        <JobRows key={job.id} job={job} titles={titles} />
-      ))}
-    </ScrollTable>
-  );
-}
-
-/** Rows of a job: what it is, its campaign, state and times; below them its progress, failure and log, if any. */
-function JobRows({ job, titles }: { job: Job; titles: ReadonlyMap<string, string> }) {
-  const cancel = useCancelJob();
-  const retry = useRetryJob();
-  const [isLogOpen, setLogOpen] = useState(false);
-  const title = jobTitle(job, titles);
-  const link = jobLink(job);
-  const refusal = cancel.error ?? retry.error;
-  const hasMore = isLogOpen || isUnderWay(job) || job.problem !== null || refusal !== null;
-  return (
-    <tbody data-state={job.state}>
-      <tr>
-        <th scope="row">
-          {link === null ? title : <Linked to={link}>{title}</Linked>} <small className="numbers">Job {job.id}</small>
-        </th>
-        <td>
-          {job.campaign_id !== null && (
-            <Linked to={`/campaigns/${job.campaign_id}`}>{job.campaign_name ?? `Campaign ${job.campaign_id}`}</Linked>
-          )}
-        </td>
-        <td>
-          <StateBadge words={jobStateLabel(job.state)} />
-          {job.attempts > 1 && <small className="numbers">{count(job.attempts, "attempt")}</small>}
-        </td>
-        <td className="numbers">
-          <Time at={job.created_at} />
-        </td>
-        <td className="numbers">
-          {job.finished_at !== null && job.started_at !== null && between(job.started_at, job.finished_at)}
-        </td>
-        <td className={classes["actions"]}>
-          {job.started_at !== null && (
+  const acts = [
+    { name: "cancel", word: "Cancel", ...useCancelJob() },
+    { name: "retry", word: "Retry", ...useRetryJob() },
+  ];
+  const [opened, setOpened] = useState<readonly number[]>([]);
+  const columns: Column<Job>[] = [
+    {
+      title: "Job",
+      isHeading: true,
+      cell: (job) => (
+        <>
+          {job.kind === "reproduction" ? (
+            <Linked to={`/reproductions#${job.name}`}>{jobTitle(job, titles)}</Linked>
+          ) : (
+            jobTitle(job, titles)
+          )}{" "}
+          <Note span fz="small" fw={400}>
+            Job {job.id}
+          </Note>
+        </>
+      ),
+    },
+    {
+      title: "Campaign",
+      isText: true,
+      cell: ({ campaign_id: id, campaign_name: name }) =>
+        id !== null && <Linked to={`/campaigns/${id}`}>{name ?? `Campaign ${id}`}</Linked>,
+    },
+    {
+      title: "State",
+      isText: true,
+      cell: ({ state, attempts }) => (
+        <>
+          <StateBadge words={STATE_LABELS[state]} />
+          {attempts > 1 && <small>{count(attempts, "attempt")}</small>}
+        </>
+      ),
+    },
+    { title: "Requested", isText: true, cell: ({ created_at }) => <Time at={created_at} /> },
+    {
+      title: "Duration",
+      isText: true,
+      cell: ({ started_at, finished_at }) => started_at && finished_at && between(started_at, finished_at),
+    },
+    {
+      title: "Actions",
+      hidesTitle: true,
+      className: classes["actions"],
+      cell: ({ id, started_at, actions }) => (
+        <>
+          {started_at !== null && (
             <Button
               variant="subtle"
-              aria-label={`Log of job ${job.id}`}
-              aria-expanded={isLogOpen}
-              onClick={() => setLogOpen(!isLogOpen)}
+              aria-label={`Log of job ${id}`}
+              aria-expanded={opened.includes(id)}
+              onClick={() => setOpened(toggled(opened, id))}
             >
               Log
             </Button>
           )}
-          {job.actions.includes("cancel") && (
-            <Button
-              variant="default"
-              aria-label={`Cancel job ${job.id}`}
-              loading={cancel.isPending}
-              onClick={() => cancel.mutate(job.id)}
-            >
-              Cancel
-            </Button>
-          )}
-          {job.actions.includes("retry") && (
-            <Button
-              variant="default"
-              aria-label={`Retry job ${job.id}`}
-              loading={retry.isPending}
-              onClick={() => retry.mutate(job.id)}
-            >
-              Retry
-            </Button>
-          )}
-        </td>
-      </tr>
-      {hasMore && (
-        <tr>
-          <td colSpan={COLUMNS.length}>
-            {isUnderWay(job) && <JobProgress job={job} title={`Progress of job ${job.id}: ${title}`} />}
+          {acts
+            .filter(({ name }) => actions.includes(name))
+            .map(({ name, word, isPending, variables, mutate }) => (
+              <Button
+                key={name}
+                variant="default"
+                aria-label={`${word} job ${id}`}
+                loading={isPending && variables === id}
+                onClick={() => mutate(id)}
+              >
+                {word}
+              </Button>
+            ))}
+        </>
+      ),
+    },
+  ];
+  return (
+    <ListTable
+      label={label}
+      className={classes["jobs"]}
+      columns={columns}
+      rows={jobs}
+      keyOf={({ id }) => String(id)}
+      marks={({ state }) => ({ "data-state": state })}
+      below={(job) => {
+        const refusal = acts.find(({ variables, error }) => variables === job.id && error !== null)?.error;
+        const isLogOpen = opened.includes(job.id);
+        if (!isLogOpen && !isUnderWay(job) && job.problem === null && !refusal) return null;
+        return (
+          <>
+            {isUnderWay(job) && <JobProgress job={job} title={`Progress of job ${job.id}: ${jobTitle(job, titles)}`} />}
             {job.problem !== null && (
               <Aside tone={job.state === "failed" ? "bad" : undefined} fz="body">
                 <strong>{job.problem.title}</strong>
@@ -117,16 +123,16 @@ function JobRows({ job, titles }: { job: Job; titles: ReadonlyMap<string, string
             )}
             <ErrorNotice error={refusal} />
             {isLogOpen && <JobLog job={job} />}
-          </td>
-        </tr>
-      )}
-    </tbody>
+          </>
+        );
+      }}
+    />
   );
 }
 
 function Linked({ to, children }: { to: string; children: ReactNode }) {
   return (
-    <Anchor component={Link} to={to} className={row["link"]}>
+    <Anchor component={Link} to={to} display="inline-block" py={4}>
       {children}
     </Anchor>
   );
@@ -137,7 +143,7 @@ export function JobProgress({ job, title }: { job: Job; title: string }) {
   return (
     <Box miw={0}>
       <progress
-        className={classes["bar"]}
+        style={{ width: "100%", accentColor: "var(--best)" }}
         aria-label={title}
         aria-valuetext={progressText(job)}
         value={Math.floor(100 * (job.done_share ?? 0))}
@@ -153,39 +159,37 @@ export function JobProgress({ job, title }: { job: Job; title: string }) {
 /** The worker's log of a job. */
 function JobLog({ job }: { job: Job }) {
   const { data: log, error } = useJobLog(job.id);
+  if (log === undefined) return <ErrorNotice error={error} />;
+  const { lines, total } = log;
   return (
     <>
-      <ErrorNotice error={error} />
-      {log?.lines.length === 0 && (
+      {total === 0 && <Note fz="small">The log was deleted.</Note>}
+      {total > lines.length && (
         <Note fz="small" mb={6}>
-          The log was deleted.
-        </Note>
-      )}
-      {log !== undefined && log.total > log.lines.length && (
-        <Note fz="small" mb={6}>
-          The last {log.lines.length} of {log.total} lines:
+          The last {lines.length} of {total} lines:
         </Note>
       )}
       <ol className={classes["lines"]}>
-        {log?.lines.map((line) => (
-          <Line key={`${line.at} ${line.message}`} line={line} />
-        ))}
+        {lines.map(({ at, level, message, details, exception }) => {
+          const more = Object.entries(details).map(([name, value]) => `${name} ${value}`);
+          return (
+            <li key={`${at} ${message}`} data-level={level}>
+              <time dateTime={at} title={utcTime(at)}>
+                {new Date(at).toLocaleTimeString()}
+              </time>{" "}
+              {level !== "info" && <strong>{level}: </strong>}
+              {message}
+              {more.length > 0 && (
+                <Note span inherit>
+                  {" "}
+                  ({more.join(", ")})
+                </Note>
+              )}
+              {exception !== "" && <pre>{exception}</pre>}
+            </li>
+          );
+        })}
       </ol>
     </>
-  );
-}
-
-function Line({ line: { at, level, message, details, exception } }: { line: LogLine }) {
-  const more = Object.entries(details).map(([name, value]) => `${name} ${value}`);
-  return (
-    <li data-level={level}>
-      <time dateTime={at} title={utcTime(at)} className="numbers">
-        {new Date(at).toLocaleTimeString()}
-      </time>{" "}
-      {level !== "info" && <strong>{level}: </strong>}
-      {message}
-      {more.length > 0 && <span className={classes["details"]}> ({more.join(", ")})</span>}
-      {exception !== "" && <pre className={classes["exception"]}>{exception}</pre>}
-    </li>
   );
 }

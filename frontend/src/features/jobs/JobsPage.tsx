@@ -8,27 +8,25 @@ import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
 import { JobTable } from "./JobTable";
 
-type GroupName = "failed" | "open" | "over";
-type Filter = "all" | GroupName;
+const STATES = {
+  Failed: ["failed"],
+  Active: ["queued", "running"],
+  Finished: ["done", "cancelled"],
+} as const satisfies Record<string, readonly JobState[]>;
+type GroupName = keyof typeof STATES;
+type Filter = GroupName | "All";
 
-const GROUPS: Record<GroupName, { title: string; states: readonly JobState[]; none: string }> = {
-  failed: { title: "Failed jobs", states: ["failed"], none: "No failed jobs." },
-  open: { title: "Active jobs", states: ["queued", "running"], none: "No active jobs." },
-  over: { title: "Finished jobs", states: ["done", "cancelled"], none: "No finished jobs." },
-};
-const ORDER = ["failed", "open", "over"] as const;
 /** Number of failed jobs shown above the active ones. */
 const FAILURES_FIRST = 3;
 
 /** All jobs: failed, active, finished. */
 export function JobsPage() {
   useTitle("Jobs");
-  const [filter, setFilter] = useState<Filter>("all");
-  const jobs = { failed: useGroup("failed", filter), open: useGroup("open", filter), over: useGroup("over", filter) };
+  const [filter, setFilter] = useState<Filter>("All");
+  const groups = [useGroup("Failed", filter), useGroup("Active", filter), useGroup("Finished", filter)];
   const titles = new Map((useReproductions().data?.items ?? []).map(({ name, title }) => [name, title]));
-  const shown = ORDER.filter((group) => filter === "all" || filter === group);
-  const isPending = shown.some((group) => jobs[group].isPending);
-  const isEmpty = !isPending && shown.every((group) => jobs[group].total === 0);
+  const shown = groups.filter(({ group }) => filter === "All" || filter === group);
+  const isPending = shown.some((jobs) => jobs.isPending);
   return (
     <>
       <Group justify="space-between" gap={12} mb={14}>
@@ -37,29 +35,37 @@ export function JobsPage() {
           aria-label="Jobs shown"
           size="md"
           value={filter}
-          onChange={(value) => setFilter(value as Filter)}
-          data={[
-            { value: "all", label: "All" },
-            { value: "failed", label: "Failed" },
-            { value: "open", label: "Active" },
-            { value: "over", label: "Finished" },
-          ]}
+          onChange={setFilter}
+          data={["All", "Failed", "Active", "Finished"]}
         />
       </Group>
-      <ErrorNotice error={shown.map((group) => jobs[group].error).find((error) => error !== null)} />
+      <ErrorNotice error={shown.find(({ error }) => error !== null)?.error} />
       {isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
-      {isEmpty && (
+      {!isPending && shown.every(({ total }) => total === 0) && (
         <Note py={48} ta="center">
-          {filter === "all"
+          {filter === "All"
             ? "No jobs yet. Proposals, error landscapes and reproductions appear here."
-            : GROUPS[filter].none}
+            : `No ${filter.toLowerCase()} jobs.`}
         </Note>
       )}
       <Stack gap="var(--gap)">
         {shown
-          .filter((group) => jobs[group].total > 0)
-          .map((group) => (
-            <JobGroup key={group} group={group} found={jobs[group]} titles={titles} onAll={() => setFilter(group)} />
+          .filter(({ total }) => total > 0)
+          .map(({ group, items, total, isBrief, ...query }) => (
+            <Panel key={group} title={`${group} jobs`}>
+              <JobTable label={`${group} jobs`} jobs={items} titles={titles} />
+              {query.hasNextPage && (
+                <Box mt={20} ta="center">
+                  <Button
+                    variant="default"
+                    loading={query.isFetchingNextPage}
+                    onClick={() => (isBrief ? setFilter(group) : void addPage(query))}
+                  >
+                    {isBrief ? `Show all ${total} failed jobs` : `Show more (${items.length} of ${total})`}
+                  </Button>
+                </Box>
+              )}
+            </Panel>
           ))}
       </Stack>
     </>
@@ -67,35 +73,8 @@ export function JobsPage() {
 }
 
 function useGroup(group: GroupName, filter: Filter) {
-  const isBrief = group === "failed" && filter === "all";
-  const query = useJobs(GROUPS[group].states, isBrief ? FAILURES_FIRST : JOBS_PAGE);
+  const isBrief = group === "Failed" && filter === "All";
+  const query = useJobs(STATES[group], isBrief ? FAILURES_FIRST : JOBS_PAGE);
   const items = query.data?.pages.flatMap((page) => page.items) ?? [];
-  return { ...query, isBrief, items, total: query.data?.pages[0]?.total ?? 0 };
-}
-
-interface JobGroupProps {
-  group: GroupName;
-  found: ReturnType<typeof useGroup>;
-  titles: ReadonlyMap<string, string>;
-  onAll: () => void;
-}
-
-function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, onAll }: JobGroupProps) {
-  const { title } = GROUPS[group];
-  return (
-    <Panel title={title}>
-      <JobTable label={title} jobs={items} titles={titles} />
-      {query.hasNextPage && (
-        <Box mt={20} ta="center">
-          <Button
-            variant="default"
-            loading={query.isFetchingNextPage}
-            onClick={() => (isBrief ? onAll() : void addPage(query))}
-          >
-            {isBrief ? `Show all ${total} failed jobs` : `Show more (${items.length} of ${total})`}
-          </Button>
-        </Box>
-      )}
-    </Panel>
-  );
+  return { ...query, group, isBrief, items, total: query.data?.pages[0]?.total ?? 0 };
 }

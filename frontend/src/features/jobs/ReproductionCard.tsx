@@ -1,4 +1,4 @@
-import { Button, Text, useComputedColorScheme } from "@mantine/core";
+import { Box, Button, SimpleGrid, Text, useComputedColorScheme } from "@mantine/core";
 import { IconPlayerPlay, IconX } from "@tabler/icons-react";
 import {
   type ReproductionRow,
@@ -10,14 +10,14 @@ import {
 } from "../../api/jobs";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { Aside } from "../../ui/Aside";
+import { type Column, ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
-import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
 import { JobProgress } from "./JobTable";
-import { type ComparedColumn, comparedColumns, duration, grouped, isUnderWay, measure, ratioSpan } from "./jobs";
+import { comparedColumns, duration, isUnderWay, measure, ratioSpan } from "./jobs";
 import classes from "./ReproductionCard.module.css";
 
 const FIGURE_HEIGHT_PX = 360;
@@ -28,7 +28,7 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
   const result = useReproductionResult(name, latest?.job_id ?? null);
   const span = result.data ? ratioSpan(result.data.rows) : null;
   return (
-    <article id={name} className={classes["card"]} aria-label={title}>
+    <Box component="article" id={name} display="grid" miw={0} style={{ gap: "var(--gap)" }} aria-label={title}>
       <Panel title={title} tools={<Actions reproduction={reproduction} />}>
         <Text maw="90ch" lh={1.45} mb={8}>
           <strong>In the paper:</strong> {paper}
@@ -51,13 +51,13 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
         )}
       </Panel>
       {latest !== null && (
-        <div className={classes["figures"]}>
+        <SimpleGrid minColWidth="min(420px, 100%)" autoFlow="auto-fit" spacing="var(--gap)">
           {figures.map((figure) => (
             <Figure key={figure.name} name={name} figure={figure.name} title={figure.title} jobId={latest.job_id} />
           ))}
-        </div>
+        </SimpleGrid>
       )}
-    </article>
+    </Box>
   );
 }
 
@@ -152,53 +152,49 @@ const RATIO_DIGITS = 3;
 
 /** Own and published numbers, grouped. */
 function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; title: string }) {
-  const columns = comparedColumns(rows);
+  const columns: Column<ReproductionRow>[] = [
+    {
+      title: "Quantity",
+      hidesTitle: true,
+      isHeading: true,
+      cell: ({ label, note, overruled }) => (
+        <>
+          {label}{" "}
+          <Note span fz="fine">
+            {note}
+          </Note>{" "}
+          {overruled !== "" && (
+            <Note span fz="fine" title={overruled}>
+              refused by the gate, overruled
+            </Note>
+          )}
+        </>
+      ),
+    },
+    {
+      title: "Gainline",
+      cell: ({ measured, digits, unit }) => (
+        <>
+          <strong>{measure(measured, digits)}</strong>{" "}
+          <Note span inherit>
+            {unit}
+          </Note>
+        </>
+      ),
+    },
+    ...comparedColumns(rows).map(([key, heading]) => ({
+      title: heading,
+      cell: (row: ReproductionRow) => measure(row[key], key === "ratio" ? RATIO_DIGITS : row.digits),
+    })),
+  ];
   return (
-    <ScrollTable label={`${title}: numbers`} className={classes["table"]}>
-      <thead>
-        <tr>
-          <td />
-          <th scope="col">Gainline</th>
-          {columns.map(([key, heading]) => (
-            <th key={key} scope="col">
-              {heading}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      {grouped(rows).map((group) => (
-        <tbody key={group.title}>
-          <tr className={classes["group"]}>
-            <th scope="rowgroup" colSpan={2 + columns.length}>
-              {group.title}
-            </th>
-          </tr>
-          {group.rows.map((row) => (
-            <Row key={row.label} row={row} columns={columns} />
-          ))}
-        </tbody>
-      ))}
-    </ScrollTable>
-  );
-}
-
-function Row({ row, columns }: { row: ReproductionRow; columns: readonly ComparedColumn[] }) {
-  return (
-    <tr>
-      <th scope="row">
-        {row.label} {row.note !== "" && <span className={classes["note"]}>{row.note}</span>}{" "}
-        {row.overruled !== "" && (
-          <span className={classes["note"]} title={row.overruled}>
-            refused by the gate, overruled
-          </span>
-        )}
-      </th>
-      <td className={classes["ours"]}>
-        {measure(row.measured, row.digits)} <span className={classes["unit"]}>{row.unit}</span>
-      </td>
-      {columns.map(([key]) => (
-        <td key={key}>{measure(row[key], key === "ratio" ? RATIO_DIGITS : row.digits)}</td>
-      ))}
-    </tr>
+    <ListTable
+      label={`${title}: numbers`}
+      className={classes["table"]}
+      columns={columns}
+      rows={rows}
+      keyOf={({ group, label }) => `${group} ${label}`}
+      groupOf={({ group }) => group}
+    />
   );
 }

@@ -1,20 +1,16 @@
 /** Texts of jobs and reproductions: states, durations, progress, comparison with the paper. */
 
 import type { Job, JobState, ReproductionRow } from "../../api/jobs";
-import { NOTHING, percentText } from "../../ui/format";
+import { NOTHING, percentText, trueMinus } from "../../ui/format";
 import type { StateLabel } from "../../ui/states";
 
-const JOB: Record<JobState, StateLabel> = {
+export const STATE_LABELS: Record<JobState, StateLabel> = {
   queued: { word: "Queued", tone: "quiet" },
   running: { word: "Running", tone: "busy" },
   done: { word: "Done", tone: "good" },
   failed: { word: "Failed", tone: "bad" },
   cancelled: { word: "Cancelled", tone: "quiet" },
 };
-
-export function jobStateLabel(state: JobState): StateLabel {
-  return JOB[state];
-}
 
 export function isUnderWay({ state }: Pick<Job, "state">): boolean {
   return state === "queued" || state === "running";
@@ -29,8 +25,7 @@ export function duration(seconds: number): string {
   return `${Math.floor(whole / 3600)} h ${Math.round((whole % 3600) / 60)} min`;
 }
 
-export function between(from: string | null, to: string | null): string {
-  if (from === null || to === null) return NOTHING;
+export function between(from: string, to: string): string {
   return duration((Date.parse(to) - Date.parse(from)) / 1000);
 }
 
@@ -52,51 +47,26 @@ export function jobTitle({ kind, name }: Job, titles: ReadonlyMap<string, string
   return name === "" ? kind : `${kind} ${name}`;
 }
 
-/** Link to the result of a job that has no campaign. */
-export function jobLink({ kind, name }: Job): string | null {
-  return kind === "reproduction" ? `/reproductions#${name}` : null;
-}
-
-export interface RowGroup {
-  title: string;
-  rows: ReproductionRow[];
-}
-
-/** Rows grouped by heading, in their original order. */
-export function grouped(rows: readonly ReproductionRow[]): RowGroup[] {
-  const groups: RowGroup[] = [];
-  for (const row of rows) {
-    const last = groups.at(-1);
-    if (last?.title === row.group) last.rows.push(row);
-    else groups.push({ title: row.group, rows: [row] });
-  }
-  return groups;
-}
-
 const COMPARED = [
   ["paper", "Paper"],
   ["ratio", "Ratio"],
   ["reference", "Expected"],
 ] as const;
 
-export type ComparedColumn = (typeof COMPARED)[number];
-
 /** Columns next to our numbers, without empty ones. */
-export function comparedColumns(rows: readonly ReproductionRow[]): ComparedColumn[] {
+export function comparedColumns(rows: readonly ReproductionRow[]) {
   return COMPARED.filter(([key]) => rows.some((row) => row[key] !== null));
 }
 
 /** Range of measured over published in the first group that has any: "0.86 to 1.02 times the published values". */
 export function ratioSpan(rows: readonly ReproductionRow[]): string | null {
-  for (const group of grouped(rows)) {
-    const ratios = group.rows.flatMap(({ ratio }) => (ratio === null ? [] : [ratio]));
-    if (ratios.length === 0) continue;
-    const [low, high] = [Math.min(...ratios).toFixed(2), Math.max(...ratios).toFixed(2)];
-    return low === high ? `${low} times the published value` : `${low} to ${high} times the published values`;
-  }
-  return null;
+  const first = rows.find(({ ratio }) => ratio !== null);
+  const ratios = rows.flatMap(({ group, ratio }) => (group === first?.group && ratio !== null ? [ratio] : []));
+  if (ratios.length === 0) return null;
+  const [low, high] = [Math.min(...ratios).toFixed(2), Math.max(...ratios).toFixed(2)];
+  return low === high ? `${low} times the published value` : `${low} to ${high} times the published values`;
 }
 
 export function measure(value: number | null, digits: number): string {
-  return value === null ? NOTHING : value.toFixed(digits).replace("-", "−");
+  return value === null ? NOTHING : trueMinus(value.toFixed(digits));
 }

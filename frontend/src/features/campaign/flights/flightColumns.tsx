@@ -1,10 +1,9 @@
 /** The columns of the table of flights. */
 
-import type { ReactNode } from "react";
 import type { Trial } from "../../../api/types";
 import { StateBadge } from "../../../ui/Badges";
-import type { Topic } from "../../../ui/explanations";
 import { gainText, NOTHING, withUnit } from "../../../ui/format";
+import type { Column } from "../../../ui/ListTable";
 import { trialStateLabel } from "../../../ui/states";
 import { hasStepResponse, MEASURES, measureText } from "../../../ui/stepResponse";
 import { Time } from "../../../ui/Time";
@@ -13,32 +12,11 @@ import { CHOICES } from "../proposal/choices";
 import { sentenceOf } from "../verdict/verdict";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
 import classes from "./FlightsPanel.module.css";
-import type { Sortable } from "./flightsTable";
 
-export interface FlightColumn {
+export interface FlightColumn extends Column<Trial> {
   id: string;
-  title: string;
-  detail?: string | undefined;
-  topic?: Topic;
-  className?: string | undefined;
   /** Hidden until it is chosen. */
   extra?: boolean;
-  value: (trial: Trial) => Sortable;
-  cell: (trial: Trial) => ReactNode;
-}
-
-function Predicted({ trial, unit }: { trial: Trial; unit: string }) {
-  return (
-    <>
-      <span className={classes["predicted"]}>
-        {withUnit(trial.predicted_error, unit)}
-        <PredictionResult trial={trial} brief />
-      </span>
-      {trial.predicted_interval && (
-        <small className={classes["range"]}>{rangeText(trial.predicted_interval, unit)}</small>
-      )}
-    </>
-  );
 }
 
 const KINDS: Record<Trial["kind"], string> = {
@@ -50,15 +28,6 @@ const KINDS: Record<Trial["kind"], string> = {
   manual: CHOICES.own.label,
 };
 
-function State({ trial }: { trial: Trial }) {
-  return (
-    <span className={classes["state"]}>
-      <StateBadge words={trialStateLabel(trial.state)} />
-      <FlightMarkers trial={trial} />
-    </span>
-  );
-}
-
 /** The columns after the flight number, from the left: gains and results as in the paper's Table 1. */
 export function flightColumns(
   trials: readonly Trial[],
@@ -68,7 +37,7 @@ export function flightColumns(
   const gains = Object.keys(trials[0]?.gains ?? {}).map((name) => ({
     id: name,
     title: name,
-    detail: gainTitles[name],
+    detail: gainTitles[name] ?? "",
     value: ({ gains: own }: Trial) => own[name] ?? null,
     cell: ({ gains: own }: Trial) => <span title={String(own[name] ?? "")}>{gainText(own[name] ?? Number.NaN)}</span>,
   }));
@@ -94,20 +63,29 @@ export function flightColumns(
       title: "Predicted",
       topic: "interval",
       value: ({ predicted_error }) => predicted_error,
-      cell: (trial) => <Predicted trial={trial} unit={unit} />,
+      cell: (trial) => (
+        <>
+          {withUnit(trial.predicted_error, unit)} <PredictionResult trial={trial} brief />
+          {trial.predicted_interval && <small>{rangeText(trial.predicted_interval, unit)}</small>}
+        </>
+      ),
     },
     {
       id: "state",
       title: "State",
-      className: classes["text"],
+      isText: true,
       value: ({ state }) => trialStateLabel(state).word,
-      cell: (trial) => <State trial={trial} />,
+      cell: (trial) => (
+        <>
+          <StateBadge words={trialStateLabel(trial.state)} /> <FlightMarkers trial={trial} />
+        </>
+      ),
     },
     ...measures,
     {
       id: "flown",
       title: "Flown",
-      className: classes["text"],
+      isText: true,
       extra: true,
       value: ({ flown_at }) => flown_at,
       cell: ({ flown_at }) => <Time at={flown_at} />,
@@ -115,7 +93,7 @@ export function flightColumns(
     {
       id: "kind",
       title: "Kind",
-      className: classes["text"],
+      isText: true,
       extra: true,
       value: ({ kind }) => KINDS[kind],
       cell: ({ kind }) => KINDS[kind],
@@ -123,7 +101,8 @@ export function flightColumns(
     {
       id: "verdict",
       title: "Verdict",
-      className: `${classes["text"]} ${classes["verdict"]}`,
+      isText: true,
+      className: classes["verdict"],
       value: (trial) => sentenceOf(trial) || null,
       cell: (trial) => sentenceOf(trial) || NOTHING,
     },

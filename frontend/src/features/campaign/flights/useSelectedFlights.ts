@@ -1,9 +1,10 @@
 import { useCallback, useState } from "react";
 import { useNavigate } from "react-router";
+import { paramsOf } from "../../../api/compare";
 import type { Trial } from "../../../api/types";
 import { useKeys } from "../../../frame/useKeys";
 import { wasFlown } from "../../../ui/states";
-import { toggled } from "./flightsTable";
+import { toggled } from "../../../ui/toggled";
 
 export interface SelectedFlights {
   selected: readonly number[];
@@ -22,8 +23,7 @@ export function useSelectedFlights(campaignId: number, shown: Trial | null): Sel
   return { selected, onSelect };
 }
 
-/** Address of the comparison of these flights, in the order of selection: the first is the reference. */
+/** Address of the comparison of these flights, in the order of selection. */
 export function comparisonAddress(campaignId: number, trialIds: readonly number[]): string {
-  const trials = trialIds.map((trial): [string, string] => ["trial", String(trial)]);
-  return `/compare?${new URLSearchParams([["campaign", String(campaignId)], ...trials])}`;
+  return `/compare?${paramsOf(trialIds, campaignId)}`;
 }

@@ -8,12 +8,10 @@ import type { Topic } from "../../../ui/explanations";
 import { count, flightNumbers, sharesText } from "../../../ui/format";
 import { gainsInBrackets } from "../../../ui/gains";
 import { HelpTip } from "../../../ui/HelpTip";
+import { type Column, ListTable } from "../../../ui/ListTable";
 import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
-import { useLastRows } from "../../../ui/paging";
-import { ScrollTable } from "../../../ui/ScrollTable";
-import table from "../../../ui/ScrollTable.module.css";
 import { confidenceText, plusMinus } from "../../../ui/uncertainty";
 import { VERDICTS } from "../verdict/verdict";
 import classes from "./StatisticsPanel.module.css";
@@ -169,38 +167,37 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
   );
 }
 
-/** Rows that stay in sight: the best and the first gains, and what was flown repeatedly. */
-function isKept({ is_best, is_baseline, trial_numbers }: RepeatGroup): boolean {
-  return is_best || is_baseline || trial_numbers.length > 1;
-}
-
 /** One row for each gain set. */
 function Groups({ groups, error_unit: unit }: CampaignStatistics) {
-  const names = Object.keys(groups[0]?.gains ?? {});
-  const { more, listed } = useLastRows(groups, 4, "gain sets", isKept);
+  const columns: Column<RepeatGroup>[] = [
+    {
+      title: `[${Object.keys(groups[0]?.gains ?? {}).join(" ")}]`,
+      isHeading: true,
+      cell: ({ gains }) => gainsInBrackets(gains),
+    },
+    { title: "Flight no.", cell: ({ trial_numbers }) => flightNumbers(trial_numbers) },
+    {
+      title: "Mean error ± standard error",
+      topic: "standardError",
+      cell: ({ mean, standard_error }) => plusMinus(mean, standard_error, unit),
+    },
+    {
+      title: "Role",
+      cell: ({ is_best, is_baseline }) =>
+        [is_best ? "best" : "", is_baseline ? "baseline" : ""].filter(Boolean).join(", "),
+    },
+  ];
   return (
-    <ScrollTable label="Gain sets flown" framed className={`${table["numeric"]} ${classes["groups"]}`}>
-      <thead>
-        <tr>
-          <th scope="col">[{names.join(" ")}]</th>
-          <th scope="col">Flight no.</th>
-          <th scope="col">
-            Mean error ± standard error <HelpTip topic="standardError" />
-          </th>
-          <th scope="col">Role</th>
-        </tr>
-      </thead>
-      <tbody>
-        {more}
-        {listed.map((group) => (
-          <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
-            <th scope="row">{gainsInBrackets(group.gains)}</th>
-            <td>{flightNumbers(group.trial_numbers)}</td>
-            <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
-            <td>{[group.is_best ? "best" : "", group.is_baseline ? "baseline" : ""].filter(Boolean).join(", ")}</td>
-          </tr>
-        ))}
-      </tbody>
-    </ScrollTable>
+    <ListTable
+      label="Gain sets flown"
+      framed
+      className={classes["groups"]}
+      columns={columns}
+      rows={groups}
+      keyOf={({ trial_numbers: [first] }) => String(first)}
+      what="gain sets"
+      isKept={({ is_best, is_baseline, trial_numbers }) => is_best || is_baseline || trial_numbers.length > 1}
+      marks={({ is_best }) => ({ "data-best": is_best || undefined })}
+    />
   );
 }
