@@ -13,11 +13,12 @@ HERE: Final = Path(__file__).parent
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """What is added: modules by the files in which they stand, below the recipe's folder, and lines in others. `tests`
-    are run besides those in `used.py`, those of this name."""
+    """What is added: modules by the files in which they stand, below the recipe's folder, and lines in others; `given`
+    are those of another recipe that this one builds on. `tests` are run besides those in `used.py`."""
 
     added: dict[str, str]
     changes: tuple[Change, ...]
+    given: tuple[Change, ...] = ()
     tests: tuple[str, ...] = ()
 
 
@@ -25,6 +26,11 @@ STRATEGIES, EXPERIMENTS = "app.core.tuning.strategies", "app.core.experiments"
 PROFILE, VEHICLES = "app.autopilots.paparazzi.profile", "app.vehicles.registry"
 FORMATS, READERS, AUTOPILOTS = "app.logs.formats", "app.autopilots.readers", "app.autopilots.registry"
 
+REPLICAS = "app.autopilots.replicas"
+TOY: Final = (
+    line(AUTOPILOTS, "from app.autopilots.toy.profile import TOY", before="from app.core.definition"),
+    Change(AUTOPILOTS, "(PAPARAZZI, ARDUPILOT, PX4)", "(PAPARAZZI, ARDUPILOT, PX4, TOY)"),
+)
 
 RECIPES: Final = {
     "strategy": Recipe(
@@ -59,10 +65,7 @@ RECIPES: Final = {
     ),
     "autopilot": Recipe(
         added={"app.autopilots.toy": "."},
-        changes=(
-            line(AUTOPILOTS, "from app.autopilots.toy.profile import TOY", before="from app.core.definition"),
-            Change(AUTOPILOTS, "(PAPARAZZI, ARDUPILOT, PX4)", "(PAPARAZZI, ARDUPILOT, PX4, TOY)"),
-        ),
+        changes=TOY,
     ),
     "log_format": Recipe(
         added={"app.logs.text_log": "text_log.py", "app.autopilots.paparazzi.text": "text.py"},
@@ -72,6 +75,21 @@ RECIPES: Final = {
             line(FORMATS, "    (Format.TEXT, is_text_log),", before="    (Format.GROUND_LOG, is_ground_log)"),
             line(READERS, "from app.autopilots.paparazzi.text import TEXT", before="from app.autopilots.px4.flight"),
             line(READERS, "    Format.TEXT: Reader(**TEXT),", before="    Format.GROUND_LOG: Reader("),
+        ),
+    ),
+    "replica": Recipe(
+        added={
+            "app.autopilots.toy": "../autopilot",
+            "app.autopilots.toy.replica": ".",
+            "app.autopilots.toy.replica_check": "replica_check.py",
+        },
+        given=TOY,
+        changes=(
+            line(
+                REPLICAS, "from app.autopilots.toy import replica_check as toy", before="from app.autopilots.replica_"
+            ),
+            line(REPLICAS, "from app.autopilots.toy.profile import TOY", before="\nREPLICAS: Final"),
+            Change(REPLICAS, "PAPARAZZI: paparazzi.REPLICA", "PAPARAZZI: paparazzi.REPLICA, TOY: toy.REPLICA"),
         ),
     ),
     "figure": Recipe(
@@ -89,7 +107,7 @@ RECIPES: Final = {
 
 def run(name: str) -> int:
     recipe, folder = RECIPES[name], HERE / name
-    add({module: folder / file for module, file in recipe.added.items()}, *recipe.changes)
+    add({module: folder / file for module, file in recipe.added.items()}, *recipe.given, *recipe.changes)
     import pytest
 
     options = ("-q", "-n", "0", "-p", "no:cacheprovider")
