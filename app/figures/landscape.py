@@ -129,12 +129,12 @@ class LandscapeFigure:
                 hovertext=[self._hover_text(flight) for flight in flights],
             )
         if best is not None:
-            mark, told = theme.solid(palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
-            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=told)
+            mark, text = theme.solid(palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
+            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=text)
         if proposal is not None:
             mark = theme.solid(palette.prediction, size=13, symbol="diamond", line=edge)
-            name, told = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
-            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=told)
+            name, text = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
+            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=text)
 
     def _numbers(self, one: Slice) -> list[str]:
         """The numbers of the first, the best and the latest flight, in one text where they have the same place."""
