@@ -128,7 +128,8 @@ class Drone:
         key = (message.counter, system)
         if key not in self._codecs:
             self._codecs[key] = self.autopilot.dialect.codec(system=system, component=self.autopilot.component)
-        return self._codecs[key].pack(self.autopilot.dialect.message(message.kind, message.fields))
+        dialect, kind = self.autopilot.dialect, message.kind
+        return self._codecs[key].pack(dialect.message(kind, {**dialect.zeros(kind), **message.fields}))
 
 
 CATCH_UP_S: Final = 2.0

@@ -194,7 +194,7 @@ def _packet(kind: int, payload: bytes) -> bytes:
 
 def _vision(sample: MocapFrame) -> dict[str, FieldValue]:
     x, y, z = sample.position_m
-    return {"usec": round(sample.time_s * 1e6), "x": x, "y": y, "z": -z, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
+    return {"usec": round(sample.time_s * 1e6), "x": x, "y": y, "z": -z}
 
 
 def _odometry(sample: MocapFrame) -> dict[str, FieldValue]:

@@ -173,10 +173,8 @@ def local_position(now: ReportingPaparazzi) -> Fields:
     return {
         "time_boot_ms": now.boot_ms,
         "x": _stepped(now.north_m, POSITION_BITS),
-        "y": 0.0,
         "z": -_stepped(now.estimated_m, POSITION_BITS),
         "vx": _stepped(now.body.north_m_s, SPEED_BITS),
-        "vy": 0.0,
         "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS) - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
     }
 
@@ -190,8 +188,6 @@ def global_position(now: ReportingPaparazzi) -> Fields:
         "lon": _LONGITUDE_E7,
         "alt": altitude_mm,
         "relative_alt": altitude_mm - now.origin_mm // 1000 - 1,
-        "vx": 0,
-        "vy": 0,
         "vz": round(-now.climb_rate_m_s * 100.0),
         "hdg": 33,
     }
@@ -200,9 +196,6 @@ def global_position(now: ReportingPaparazzi) -> Fields:
 def vfr_hud(now: ReportingPaparazzi) -> Fields:
     """Return VFR_HUD, in which `climb` is positive downwards."""
     return {
-        "airspeed": 0.0,
-        "groundspeed": 0.0,
-        "heading": 0,
         "throttle": round(now.body.thrust * 100.0),
         "alt": (now.origin_mm + _GEOID_MM) / 1000.0 + now.estimated_m,
         "climb": -now.climb_rate_m_s,
@@ -210,7 +203,6 @@ def vfr_hud(now: ReportingPaparazzi) -> Fields:
 
 
 def sys_status(now: ReportingPaparazzi) -> Fields:
-    errors = dict.fromkeys(("errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
     return {
         "onboard_control_sensors_present": 15,
         "onboard_control_sensors_enabled": 15,
@@ -219,28 +211,20 @@ def sys_status(now: ReportingPaparazzi) -> Fields:
         "voltage_battery": now.battery_mv,
         "current_battery": _current(now),
         "battery_remaining": -1,
-        "drop_rate_comm": 0,
-        **errors,
     }
 
 
 def battery_status(now: ReportingPaparazzi) -> Fields:
     return {
-        "id": 0,
-        "battery_function": 0,
-        "type": 0,
         "temperature": _NO_TEMPERATURE,
         "voltages": [now.battery_mv, *[0] * 9],
         "current_battery": _current(now),
-        "current_consumed": 0,
-        "energy_consumed": 0,
         "battery_remaining": -1,
     }
 
 
 def attitude_quaternion(now: ReportingPaparazzi) -> Fields:
-    still = dict.fromkeys(("q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
-    return {"time_boot_ms": now.boot_ms, "q1": 1.0, **still}
+    return {"time_boot_ms": now.boot_ms, "q1": 1.0}
 
 
 def global_origin(now: ReportingPaparazzi) -> Fields:

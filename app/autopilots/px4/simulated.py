@@ -203,8 +203,6 @@ class Px4(Copter):
                 "id": number,
                 "event_time_boot_ms": self.boot_ms,
                 "sequence": self._events % _SEQUENCE_NUMBERS,
-                "destination_component": 0,
-                "destination_system": 0,
                 "log_levels": levels,
                 "arguments": struct.pack(layout, *arguments).ljust(_ARGUMENTS, b"\0"),
             },

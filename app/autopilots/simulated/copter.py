@@ -284,8 +284,7 @@ class Copter(ReportingCopter):
         command = int(number(message, "command"))
         handler = _COMMANDS.get(command)
         result = UNSUPPORTED if handler is None else handler(self, message)
-        done = {"command": command, "result": result, "progress": 0, "result_param2": 0}
-        self._send("COMMAND_ACK", {**done, **sender(message)})
+        self._send("COMMAND_ACK", {"command": command, "result": result, **sender(message)})
 
     def _handle_arm(self, message: Message) -> int:
         force = number(message, "param2") == FORCE

@@ -104,10 +104,8 @@ def local_position(now: ReportingCopter) -> Fields:
     return {
         "time_boot_ms": now.boot_ms,
         "x": now.body.north_m,
-        "y": 0.0,
         "z": -(now.body.altitude_m + now.firmware.ground_m),
         "vx": now.body.north_m_s,
-        "vy": 0.0,
         "vz": -now.body.climb_rate_m_s - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
     }
 
@@ -119,10 +117,7 @@ def global_position(now: ReportingCopter) -> Fields:
         "lon": LONGITUDE_E7,
         "alt": round((HOME_AMSL_M + now.body.altitude_m) * 1000.0),
         "relative_alt": round(now.body.altitude_m * 1000.0),
-        "vx": 0,
-        "vy": 0,
         "vz": round(-now.body.climb_rate_m_s * 100.0),
-        "hdg": 0,
     }
 
 
@@ -136,35 +131,21 @@ def position_target(now: ReportingCopter) -> Fields:
         "time_boot_ms": now.boot_ms,
         "coordinate_frame": LOCAL_NED,
         "type_mask": ignored | _IGNORE_HORIZONTAL,
-        **dict.fromkeys(("x", "y", "vx", "vy", "afx", "afy", "yaw", "yaw_rate"), 0.0),
         **{name: 0.0 if name in missing else -value for name, value in up.items()},
     }
 
 
 def attitude_target(now: ReportingCopter) -> Fields:
     """Return ATTITUDE_TARGET, which is level."""
-    return {
-        "time_boot_ms": now.boot_ms,
-        "type_mask": 0,
-        "q": [1.0, 0.0, 0.0, 0.0],
-        **dict.fromkeys(("body_roll_rate", "body_pitch_rate", "body_yaw_rate"), 0.0),
-        "thrust": now.controller.demand,
-    }
+    return {"time_boot_ms": now.boot_ms, "q": [1.0, 0.0, 0.0, 0.0], "thrust": now.controller.demand}
 
 
 def controller_output(now: ReportingCopter) -> Fields:
-    return {
-        **dict.fromkeys(("nav_bearing", "target_bearing", "wp_dist"), 0),
-        **dict.fromkeys(("nav_roll", "nav_pitch", "aspd_error", "xtrack_error"), 0.0),
-        "alt_error": now.controller.error_m,
-    }
+    return {"alt_error": now.controller.error_m}
 
 
 def vfr_hud(now: ReportingCopter) -> Fields:
     return {
-        "airspeed": 0.0,
-        "groundspeed": 0.0,
-        "heading": 0,
         "throttle": round(now.body.thrust * 100.0),
         "alt": HOME_AMSL_M + now.body.altitude_m,
         "climb": now.body.climb_rate_m_s,
@@ -182,14 +163,11 @@ def sys_status(now: ReportingCopter) -> Fields:
         "voltage_battery": round(now.body.battery_v * 1000.0),
         "current_battery": -1,
         "battery_remaining": now.charge_percent,
-        **dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0),
     }
 
 
 def battery_status(now: ReportingCopter) -> Fields:
     return {
-        "id": 0,
-        "battery_function": 0,
         "type": 1,
         "temperature": 32767,
         "voltages": [round(now.body.battery_v * 1000.0), *[65535] * 9],
@@ -209,8 +187,6 @@ def gps_raw(now: ReportingCopter) -> Fields:
         "alt": round((HOME_AMSL_M + now.body.altitude_m) * 1000.0),
         "eph": 90,
         "epv": 120,
-        "vel": 0,
-        "cog": 0,
         "satellites_visible": 12,
     }
 
@@ -220,13 +196,12 @@ def home_position(_now: ReportingCopter) -> Fields:
         "latitude": LATITUDE_E7,
         "longitude": LONGITUDE_E7,
         "altitude": round(HOME_AMSL_M * 1000.0),
-        **dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), 0.0),
         "q": [1.0, 0.0, 0.0, 0.0],
     }
 
 
 def extended_state(now: ReportingCopter) -> Fields:
-    return {"vtol_state": 0, "landed_state": _LANDED_STATES[now.controller.phase]}
+    return {"landed_state": _LANDED_STATES[now.controller.phase]}
 
 
 def fence_status(now: ReportingCopter) -> Fields:
@@ -234,7 +209,6 @@ def fence_status(now: ReportingCopter) -> Fields:
         "breach_status": int(now.is_breached),
         "breach_count": now.breaches,
         "breach_type": _ALTITUDE_BREACH if now.is_breached else 0,
-        "breach_time": 0,
     }
 
 
