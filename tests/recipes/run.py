@@ -24,6 +24,7 @@ class Recipe:
 STRATEGIES, EXPERIMENTS = "app.core.tuning.strategies", "app.core.experiments"
 PROFILE, VEHICLES = "app.autopilots.paparazzi.profile", "app.vehicles.registry"
 FORMATS, READERS, AUTOPILOTS = "app.logs.formats", "app.autopilots.readers", "app.autopilots.registry"
+SIMULATED = "app.autopilots.simulated_kinds"
 
 
 RECIPES: Final = {
@@ -62,6 +63,8 @@ RECIPES: Final = {
         changes=(
             line(AUTOPILOTS, "from app.autopilots.toy.profile import TOY", before="from app.core.definition"),
             Change(AUTOPILOTS, "(PAPARAZZI, ARDUPILOT, PX4)", "(PAPARAZZI, ARDUPILOT, PX4, TOY)"),
+            line(SIMULATED, "from app.autopilots.toy.simulated import KINDS as TOY", before="SIMULATED:"),
+            Change(SIMULATED, "(*PAPARAZZI, *ARDUPILOT, *PX4)", "(*PAPARAZZI, *ARDUPILOT, *PX4, *TOY)"),
         ),
     ),
     "log_format": Recipe(
