@@ -107,32 +107,13 @@ def _fly_home(drone: FaultTarget, on: bool) -> None:
     (drone.autopilot.fly_home if on else drone.autopilot.hand_back)()
 
 
-def _ignore_parameters(drone: FaultTarget, on: bool) -> None:
-    drone.autopilot.ignores_parameters = on
-
-
-def _refuse_arming(drone: FaultTarget, on: bool) -> None:
-    drone.autopilot.refuses_arming = on
-
-
-def _stop_motors(drone: FaultTarget, on: bool) -> None:
-    drone.body.motors_dead = on
+def _flag(part: str, name: str) -> Callable[[FaultTarget, bool], None]:
+    """Sets a flag of a part of the drone."""
+    return lambda drone, on: setattr(getattr(drone, part), name, on)
 
 
 def _carry_away(drone: FaultTarget, on: bool) -> None:
     drone.body.wind_m_s = _WIND_M_S if on else 0.0
-
-
-def _blind(drone: FaultTarget, on: bool) -> None:
-    drone.cameras.blind = on
-
-
-def _freeze(drone: FaultTarget, on: bool) -> None:
-    drone.cameras.stuck = on
-
-
-def _drift(drone: FaultTarget, on: bool) -> None:
-    drone.cameras.drifts = on
 
 
 class Deaf(Fault):
@@ -299,9 +280,9 @@ class GroundDrift(ChangedMessages):
 FAULTS: Final[Mapping[str, Callable[[FaultTarget], Fault]]] = MappingProxyType(
     {
         "no-heartbeat": partial(MissingMessages, kinds=("HEARTBEAT",)),
-        "param-unconfirmed": partial(Switched, switch=_ignore_parameters),
-        "arm-refused": partial(Switched, switch=_refuse_arming),
-        "no-lift-off": partial(Switched, switch=_stop_motors),
+        "param-unconfirmed": partial(Switched, switch=_flag("autopilot", "ignores_parameters")),
+        "arm-refused": partial(Switched, switch=_flag("autopilot", "refuses_arming")),
+        "no-lift-off": partial(Switched, switch=_flag("body", "motors_dead")),
         "link-lost": LinkLost,
         "deaf": Deaf,
         "ack-lost": partial(MissingMessages, kinds=("MISSION_ACK",)),
@@ -321,9 +302,9 @@ FAULTS: Final[Mapping[str, Callable[[FaultTarget], Fault]]] = MappingProxyType(
         "reordered-packets": ReorderedPackets,
         "wrong-system": WrongSystem,
         "carried-away": partial(Switched, switch=_carry_away),
-        "mocap-lost": partial(Switched, switch=_blind),
-        "mocap-frozen": partial(Switched, switch=_freeze),
-        "mocap-drift": partial(Switched, switch=_drift),
+        "mocap-lost": partial(Switched, switch=_flag("cameras", "blind")),
+        "mocap-frozen": partial(Switched, switch=_flag("cameras", "stuck")),
+        "mocap-drift": partial(Switched, switch=_flag("cameras", "drifts")),
         "ground-drift": GroundDrift,
     }
 )
