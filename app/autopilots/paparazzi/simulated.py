@@ -21,7 +21,6 @@ from app.autopilots.paparazzi.simulated_plan import (
     NEWER_KILL_SETTING,
     TAKEOFF,
     WAYPOINTS,
-    Engine,
     FlightPlan,
     Vertical,
     held,
@@ -175,8 +174,8 @@ class Paparazzi(ReportingPaparazzi):
     def _enter(self, seq: int) -> None:
         self._plan.enter(seq, self.height_m)
         self._touched_s = None
-        if self._plan.block.engine is not Engine.LEAVE:
-            self._set_motors(on=self._plan.block.engine is Engine.RESURRECT)
+        if self._plan.block.motors is not None:
+            self._set_motors(on=self._plan.block.motors)
         if self._plan.seq == TAKEOFF:
             self.took_off = True
 

@@ -242,18 +242,9 @@ class SimulatedAutopilot(ABC):
             self.send_parameter(place)
 
 
-def attitude(now: SimulatedAutopilot) -> Fields:
-    """Return ATTITUDE, which is level."""
+def timed(now: SimulatedAutopilot) -> Fields:
+    """Return a report of the time since the start alone: SYSTEM_TIME, or ATTITUDE, which is level."""
     return {"time_boot_ms": now.boot_ms}
-
-
-def system_time(now: SimulatedAutopilot) -> Fields:
-    return {"time_boot_ms": now.boot_ms}
-
-
-def version(flight_software: int, *, capabilities: int = 0, uid: int = 0) -> Fields:
-    """Return AUTOPILOT_VERSION."""
-    return {"capabilities": capabilities, "flight_sw_version": flight_software, "uid": uid}
 
 
 def sender(message: Message) -> dict[str, int]:

@@ -79,10 +79,6 @@ class Copter(ReportingCopter):
     def fence(self) -> tuple[float, Reaction]:
         """Return the altitude limit, m, and the reaction."""
 
-    @abstractmethod
-    def idle_limit_s(self) -> float:
-        """Return the time for which it stays armed on the ground, s."""
-
     def counts_heartbeat(self, _message: Message) -> bool:
         """Return whether the heartbeat of this ground station counts."""
         return True
@@ -175,7 +171,7 @@ class Copter(ReportingCopter):
         return None if self.mode.may_arm else self.firmware.not_armable
 
     def _watch_idling(self) -> None:
-        limit_s = self.idle_limit_s()
+        limit_s = self.parameters[self.firmware.idle_limit]
         if self.armed and not self.controller.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
             self.kill()
 
