@@ -12,7 +12,6 @@ from app.autopilots import commands, mavlink
 from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
 from app.autopilots.dialects import Dialect, Message
 from app.autopilots.measurements import Measurement, VehicleEvent
-from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import GainlineError, GainsError, Problem
 from app.core.experiments.base import Experiment
 from app.core.policy import Gain, Gains, shortened
@@ -269,9 +268,6 @@ class Autopilot:
     """Returns the messages that end an exploration, successful or not."""
     refer_to_ground: Callable[[Target], tuple[Step, ...]] = lambda _target: ()
     """Returns the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
-
-    simulated: Callable[[], tuple[SimulatedKind, ...]] = lambda: ()
-    """Loads its simulated counterparts, the default first."""
 
     @property
     def logged_gains(self) -> tuple[GainSet, ...]:

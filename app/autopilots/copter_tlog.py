@@ -7,7 +7,7 @@ flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter'
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 
@@ -17,8 +17,17 @@ from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
 from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
-from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Recording, Rows, held
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, Part, choose_parts, jumps
+from app.autopilots.recording import (
+    LONGEST_INTERVAL_S,
+    ParameterHistory,
+    Parameters,
+    Recording,
+    Refused,
+    Rows,
+    held,
+    refusal,
+)
+from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, FlownSteps
@@ -46,7 +55,7 @@ class _Autopilot:
 
     `number_of_mode` is of the custom mode in a heartbeat; `mode` is the one whose set points the vehicle reports.
     `messages` are needed. Of the parameters, the gains in `bounds` are needed, and `learned` if there is one, which the
-    vehicle changes by itself; `kept` are all on which the loop depends, `usual` those that every release has.
+    vehicle changes by itself; `kept` are all on which the loop depends.
     `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
     """
 
@@ -56,7 +65,6 @@ class _Autopilot:
     messages: Sequence[str]
     bounds: Mapping[str, tuple[float, float]]
     kept: Sequence[str]
-    usual: Sequence[str]
     learned: str
     shapes_reference: bool
     hint: str
@@ -76,6 +84,8 @@ _IN_TAKEOFFS: Final = frozenset(
     {"TKOFF_SLEW_TIME", "TKOFF_THR_MAX", "MPC_TKO_RAMP_T", "COM_SPOOLUP_TIME", "MPC_LAND_SPEED"}
 )
 """Parameters that act in takeoffs and landings alone."""
+_MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, px4.HOVER_RANGE_NAME})
+"""Parameters that some releases lack."""
 
 
 _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
@@ -88,11 +98,6 @@ _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
             bounds=ArduPilotLoop.space.bounds,
             learned="MOT_THST_HOVER",
             kept=ardupilot.LOOP_NAMES,
-            usual=(
-                *ardupilot.DEFAULTS,
-                ardupilot.ACCELEROMETER_FILTER,
-                ardupilot.LOOP_RATE,
-            ),
             shapes_reference=True,
             hint=_ASK.format(
                 mode="GUIDED",
@@ -109,7 +114,6 @@ _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
             bounds=Px4Loop.space.bounds,
             learned="",
             kept=px4.LOOP_NAMES,
-            usual=(*px4.DEFAULTS, *px4.ESTIMATOR_NAMES),
             shapes_reference=False,
             hint=_ASK.format(
                 mode="Offboard",
@@ -133,71 +137,6 @@ def copter_steps(recording: Recording, name: str) -> LoggedFlight | None:
     return None if autopilot is None else _Reader(name, recording, autopilot).read()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rows:
-    """Signals up, in m and s, shape (n,) each; NaN where they are not known. `time_s` increases. `lean` is the cosine
-    of the demanded lean."""
-
-    time_s: Samples
-    altitude_m: Samples
-    climb_rate_m_s: Samples
-    throttle: Samples
-    lean: Samples
-    target_m: Samples
-    reference_m: Samples
-    is_disarmed: Rows
-
-    @classmethod
-    def of(cls, recording: Recording, autopilot: _Autopilot) -> Self:
-        """Those of a vehicle's reports, which has all that its autopilot needs."""
-        columns = recording.columns
-        time_s, altitude_m = columns["altitude_m"].time_s, columns["altitude_m"].values
-        throttle, lean = (columns[each].beside(time_s) for each in ("demanded_throttle", "lean"))
-        target_m = recording.at("target_altitude_m", time_s)
-        return cls(
-            time_s=time_s,
-            altitude_m=altitude_m,
-            climb_rate_m_s=columns["climb_rate_m_s"].values,
-            throttle=throttle if autopilot.shapes_reference else throttle * lean,
-            lean=lean,
-            target_m=target_m,
-            reference_m=altitude_m + columns["reference_error_m"].beside(time_s)
-            if autopilot.shapes_reference
-            else target_m,
-            is_disarmed=recording.at("is_armed", time_s) == 0.0,
-        )
-
-    @property
-    def is_known(self) -> Rows:
-        """Rows with all signals."""
-        signals = (self.altitude_m, self.climb_rate_m_s, self.throttle, self.lean, self.target_m, self.reference_m)
-        return np.asarray(np.isfinite(np.sum(signals, axis=0)))
-
-    @property
-    def is_off_ground(self) -> Rows:
-        """Rows above the place where it last was disarmed; all, before it was."""
-        rested = np.maximum.accumulate(np.where(self.is_disarmed, np.arange(len(self.time_s)), -1))
-        above_m = self.altitude_m - self.altitude_m[rested]
-        return np.asarray((rested < 0) | (above_m > _OFF_GROUND_M))
-
-    @property
-    def target_rate_m_s(self) -> Samples:
-        """How fast the set point moves, shape (n,): in steps."""
-        return np.diff(self.target_m, prepend=self.target_m[0]) / np.diff(self.time_s, prepend=self.time_s[0] - 1.0)
-
-    def trajectory(self, part: Part) -> Trajectory:
-        """Rows of a part that are all known, with time from its first."""
-        rows = slice(*part)
-        channels = {
-            "altitude_m": self.altitude_m[rows],
-            "climb_rate_m_s": self.climb_rate_m_s[rows],
-            "throttle": self.throttle[rows],
-            "reference_m": self.reference_m[rows],
-            "set_point_m": self.target_m[rows],
-        }
-        return Trajectory(self.time_s[rows] - self.time_s[part[0]], channels, "tlog", "vehicle")
-
-
 @dataclass(frozen=True, slots=True)
 class _Reader:
     name: str
@@ -206,29 +145,51 @@ class _Reader:
 
     def read(self) -> LoggedFlight:
         if frame := self.recording.frame:
-            raise self._refused(Problem("file", f"is the log of {frame}, not of a copter with several rotors"))
+            raise self._refused("file", f"is the log of {frame}, not of a copter with several rotors")
         if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
-            raise self._refused(*problems)
-        rows = _Rows.of(self.recording, self.autopilot)
+            raise TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
+        rows = self._rows()
+        time_s, target_m = rows.time_s, rows["set_point_m"]
         none_found = (
             f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
             "in one of the messages, a jump in altitude or a parameter change"
         )
         given, parts = choose_parts(
-            rows.time_s,
+            time_s,
             self._conditions(rows),
-            jumps(rows.time_s, rows.altitude_m, rows.climb_rate_m_s, _JUMP_M),
+            jumps(time_s, rows["altitude_m"], rows["climb_rate_m_s"], _JUMP_M),
             ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
-            rows.target_rate_m_s,
-            self._refused_for,
+            np.diff(target_m, prepend=target_m[0]) / np.diff(time_s, prepend=time_s[0] - 1.0),
+            self._refused,
             ("LOCAL_POSITION_NED", none_found),
             self.autopilot.bounds,
             lambda _: _READ_LATE,
         )
-        part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
-        learned = self._learned(float(rows.time_s[part[0]]))
-        flight = self._flight(rows.trajectory(part), {**given, **learned})
+        part = max((slice(*each) for each in parts), key=lambda each: float(np.ptp(target_m[each])))
+        begin_s = float(time_s[part.start])
+        flown = Trajectory(
+            time_s[part] - begin_s, {name: values[part] for name, values in rows.channels.items()}, "tlog", "vehicle"
+        )
+        flight = self._flight(flown, {**given, **self._learned(begin_s)})
         return replace(flight, assumed=() if self.recording.has_all_parameters else self._assumed(given))
+
+    def _rows(self) -> Trajectory:
+        """Signals of a vehicle's reports, which has all that its autopilot needs; NaN where they are not known."""
+        columns = self.recording.columns
+        time_s, altitude_m = columns["altitude_m"].time_s, columns["altitude_m"].values
+        throttle, set_point_m = columns["demanded_throttle"].beside(time_s), columns["target_altitude_m"].at(time_s)
+        if self.autopilot.shapes_reference:
+            reference_m = altitude_m + columns["reference_error_m"].beside(time_s)
+        else:
+            throttle, reference_m = throttle * columns["lean"].beside(time_s), set_point_m
+        channels = {
+            "altitude_m": altitude_m,
+            "climb_rate_m_s": columns["climb_rate_m_s"].values,
+            "throttle": throttle,
+            "reference_m": reference_m,
+            "set_point_m": set_point_m,
+        }
+        return Trajectory(time_s, channels, "tlog", "vehicle")
 
     def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
         if self.autopilot.shapes_reference:
@@ -246,14 +207,10 @@ class _Reader:
         rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
         field = "POSITION_TARGET_LOCAL_NED"
         if not rows:
-            raise self._refused(
-                Problem(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
-            )
+            raise self._refused(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
         times_s = time_s[rows]
         if np.any(np.diff(times_s) < _STEPS_APART_S):
-            raise self._refused(
-                Problem(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
-            )
+            raise self._refused(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
         end_s = time_s[found[len(rows)]] if len(found) > len(rows) else time_s[-1]
         return FlownSteps(
             set_points=SetPoints(
@@ -264,13 +221,22 @@ class _Reader:
             end_s=min(float(times_s[-1]) + _SETTLED_S, float(end_s)),
         )
 
-    def _conditions(self, rows: _Rows) -> Sequence[Condition]:
+    def _conditions(self, rows: Trajectory) -> Sequence[Condition]:
+        time_s, lean = rows.time_s, self.recording.columns["lean"].beside(rows.time_s)
+        is_known = np.isfinite(np.sum([*rows.channels.values(), lean], axis=0))
         return (
-            (_follows(self.recording, self.autopilot, rows.time_s), "HEARTBEAT", f"has no flight in {self._mode}"),
-            (rows.is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
-            (rows.is_off_ground, "LOCAL_POSITION_NED", f"never is {_OFF_GROUND_M:g} m above the ground"),
-            (rows.lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
+            (_follows(self.recording, self.autopilot, time_s), "HEARTBEAT", f"has no flight in {self._mode}"),
+            (is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
+            (self._is_off_ground(rows), "LOCAL_POSITION_NED", f"never is {_OFF_GROUND_M:g} m above the ground"),
+            (lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
         )
+
+    def _is_off_ground(self, rows: Trajectory) -> Rows:
+        """Rows above the place where it last was disarmed; all, before it was."""
+        is_disarmed = self.recording.columns["is_armed"].at(rows.time_s) == 0.0
+        rested = np.maximum.accumulate(np.where(is_disarmed, np.arange(len(rows)), -1))
+        above_m = rows["altitude_m"] - rows["altitude_m"][rested]
+        return np.asarray((rested < 0) | (above_m > _OFF_GROUND_M))
 
     def _sparse_messages(self) -> Iterator[Problem]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
@@ -325,8 +291,8 @@ class _Reader:
 
     def _assumed(self, given: Parameters) -> tuple[str, ...]:
         """By the names of the vehicle's release."""
-        known = {*given, self.autopilot.learned, *_IN_TAKEOFFS}
-        absent = [each for each in self.autopilot.usual if each not in known]
+        known = {*given, self.autopilot.learned, *_IN_TAKEOFFS, *_MAY_LACK}
+        absent = [each for each in self.autopilot.kept if each not in known]
         return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
 
     @property
@@ -337,11 +303,9 @@ class _Reader:
     def _mode(self) -> str:
         return self.autopilot.mode_name(self.autopilot.mode)
 
-    def _refused_for(self, field: str, reason: str) -> TrajectoryError:
-        return self._refused(Problem(field, reason))
-
-    def _refused(self, *problems: Problem) -> TrajectoryError:
-        return TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
+    @property
+    def _refused(self) -> Refused:
+        return refusal(f"{self.name} cannot be analysed.", self.autopilot.hint)
 
 
 def _follows(recording: Recording, autopilot: _Autopilot, time_s: Samples) -> Rows:

@@ -130,6 +130,14 @@ class Dialect:
             raise ValueError(f"{kind} cannot carry these fields: {error}") from error
         return message
 
+    def zeros(self, kind: str) -> dict[str, FieldValue]:
+        """Return the fields of the message with this name, all 0."""
+        known = _classes(self.module)[kind]
+        lengths = zip(known.ordered_fieldnames, known.array_lengths, strict=True)  # type: ignore[attr-defined]
+        zeros: dict[str, FieldValue] = dict.fromkeys(known.fieldnames, 0)  # type: ignore[attr-defined]
+        zeros.update((name, [0] * length) for name, length in lengths if length)
+        return zeros | dict.fromkeys(_capacities(known), "")
+
     def codec(self, *, system: int, component: int, signing_key: bytes | None = None) -> "Codec":
         """Return a codec of this dialect. Raises InputError for a signing key with MAVLink 1, or of a wrong length."""
         return Codec(self, system=system, component=component, signing_key=signing_key)

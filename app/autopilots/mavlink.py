@@ -16,7 +16,6 @@ from app.autopilots.dialects import (
     text,
 )
 from app.autopilots.measurements import (
-    AltitudeError,
     Attitude,
     Battery,
     CommandReply,
@@ -90,11 +89,6 @@ def battery(message: Message) -> Battery:
         voltage_v=None if millivolts in _UNKNOWN_MV else millivolts / 1000.0,
         may_arm=bool(health & _PREARM_CHECK) if (present | health) & _PREARM_CHECK else None,
     )
-
-
-def altitude_error(message: Message) -> AltitudeError:
-    """Read NAV_CONTROLLER_OUTPUT."""
-    return AltitudeError(number(message, "alt_error"))
 
 
 def target_altitude(message: Message) -> TargetAltitude | None:

@@ -9,6 +9,8 @@ from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import groupby
+from operator import itemgetter
 from typing import Final, Self
 
 import numpy as np
@@ -103,11 +105,6 @@ class Column:
     values: Samples
     source: str
     holds_s: float | None = None
-
-    @property
-    def interval_s(self) -> float:
-        """Median interval of the reports."""
-        return float(np.median(np.diff(self.time_s)))
 
     def at(self, time_s: Samples) -> Samples:
         """The quantity at other times, shape (m,)."""
@@ -230,15 +227,9 @@ def restarts(boots: int) -> list[str]:
 
 def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:
     """Intervals in which a condition held, from timed reports of it."""
-    spans: list[Span] = []
-    since_s: float | None = None
-    for time_s, holds in states:
-        if holds and since_s is None:
-            since_s = time_s
-        elif not holds and since_s is not None:
-            spans.append(Span(since_s, time_s))
-            since_s = None
-    return spans if since_s is None else [*spans, Span(since_s, np.inf)]
+    changes = [next(same) for _, same in groupby(states, key=itemgetter(1))]
+    ends_s = [*(time_s for time_s, _ in changes[1:]), np.inf]
+    return [Span(begin_s, end_s) for (begin_s, holds), end_s in zip(changes, ends_s, strict=False) if holds]
 
 
 def increasing(at_s: Samples) -> NDArray[np.int64]:

@@ -33,53 +33,22 @@ def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> R
 def find_parts(time_s: Samples, usable: Rows, begins: Rows, cuts_s: Sequence[float]) -> list[Part]:
     """Parts of usable rows that last long enough; a part also ends before a row of `begins` and at each of `cuts_s`.
 
-    `time_s`, shape (n,), increases, and `cuts_s` does too.
+    `time_s`, shape (n,), increases, and `cuts_s` does too; there are usable rows.
     """
     rows = np.flatnonzero(usable)
-    if not rows.size:
-        return []
     apart = (np.diff(rows) > 1) | (np.diff(time_s[rows]) > LONGEST_INTERVAL_S) | begins[rows[1:]]
     apart |= np.diff(np.searchsorted(cuts_s, time_s[rows], side="right")) > 0
-    ends = [*np.flatnonzero(apart).tolist(), len(rows) - 1]
-    firsts = [0, *(end + 1 for end in ends[:-1])]
-    parts = [(int(rows[first]), int(rows[end]) + 1) for first, end in zip(firsts, ends, strict=True)]
+    parts = [(int(part[0]), int(part[-1]) + 1) for part in np.split(rows, np.flatnonzero(apart) + 1)]
     return [(first, end) for first, end in parts if time_s[end - 1] - time_s[first] >= SHORTEST_PART_S]
 
 
-class Manoeuvres:
-    """How much the reference manoeuvres: its squared acceleration summed over time, which is what a fit learns from."""
-
-    def __init__(self, time_s: Samples, acceleration_m_s2: Samples) -> None:
-        self._time_s = time_s
-        self._sum = np.append(
-            0.0, np.cumsum(np.nan_to_num(acceleration_m_s2) ** 2 * np.diff(time_s, prepend=time_s[0]))
-        )
-
-    def within(self, part: Part) -> float:
-        """Sum over a part."""
-        first, end = part
-        return float(self._sum[end] - self._sum[first])
-
-    def richest(self, part: Part, lasts_s: float) -> Part:
-        """The stretch of at most `lasts_s` with the largest sum; the part itself if it is not longer."""
-        first, end = part
-        ends = np.searchsorted(self._time_s[first:end], self._time_s[first:end] + lasts_s, side="right") + first
-        sums = self._sum[ends] - self._sum[first:end]
-        best = first + int(np.argmax(sums))
-        return best, int(ends[best - first])
-
-    def choose(self, parts: Sequence[Part]) -> list[Part]:
-        """As many parts as fit into the longest flight, in order, those with most manoeuvres first; a longer one is
-        shortened."""
-        chosen: list[Part] = []
-        left_s = LONGEST_FLIGHT_S
-        for part in sorted(parts, key=self.within, reverse=True):
-            first, end = self.richest(part, left_s)
-            duration_s = float(self._time_s[end - 1] - self._time_s[first])
-            if duration_s >= SHORTEST_PART_S:
-                chosen.append((first, end))
-                left_s -= duration_s
-        return sorted(chosen)
+def _richest(time_s: Samples, sums: Samples, part: Part, lasts_s: float) -> Part:
+    """The stretch of a part of at most `lasts_s` in which `sums`, shape (n + 1,), grow the most; the part itself if it
+    is not longer."""
+    first, end = part
+    ends = np.searchsorted(time_s[first:end], time_s[first:end] + lasts_s, side="right") + first
+    best = first + int(np.argmax(sums[ends] - sums[first:end]))
+    return best, int(ends[best - first])
 
 
 def choose_parts(
@@ -93,11 +62,13 @@ def choose_parts(
     bounds: Mapping[str, tuple[float, float]],
     absent: Callable[[str], str],
 ) -> tuple[Parameters, list[Part]]:
-    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters.
+    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters: as many as fit
+    into the longest flight, in order, those with most manoeuvres first; a longer one is shortened.
 
-    Signals have shape (n,), `acceleration_m_s2` is that of the reference. Raises what `refused` makes of the field and
-    the reason of the first condition that leaves no row, or of `none_found` if no part is long enough; and of a gain in
-    `bounds` that is missing, for the reason that `absent` gives, or not positive where the search has no zero.
+    Signals have shape (n,). `acceleration_m_s2` is that of the reference: how much it manoeuvres is its square, summed
+    over time, which is what a fit learns from. Raises what `refused` makes of the field and the reason of the first
+    condition that leaves no row, or of `none_found` if no part is long enough; and of a gain in `bounds` that is
+    missing, for the reason that `absent` gives, or not positive where the search has no zero.
     """
     usable = np.ones(len(time_s), dtype=np.bool_)
     for condition, field, reason in conditions:
@@ -107,14 +78,23 @@ def choose_parts(
     parts = find_parts(time_s, usable, begins, history.times_s)
     if not parts:
         raise refused(*none_found)
-    manoeuvres = Manoeuvres(time_s, acceleration_m_s2)
-    given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
+    squares = np.nan_to_num(acceleration_m_s2) ** 2
+    sums = np.append(0.0, np.cumsum(squares * np.diff(time_s, prepend=time_s[0])))
+    parts.sort(key=lambda part: float(sums[part[1]] - sums[part[0]]), reverse=True)
+    given = history.at(float(time_s[parts[0][0]]))
     for each, (least, _) in bounds.items():
         if each not in given:
             raise refused(each, absent(each))
         if given[each] < 0.0 or (least and not given[each]):
             raise refused(each, f"must be positive, got {given[each]:g}")
-    return given, manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])
+    chosen, left_s = [], LONGEST_FLIGHT_S
+    for part in (each for each in parts if history.at(float(time_s[each[0]])) == given):
+        first, end = _richest(time_s, sums, part, left_s)
+        duration_s = float(time_s[end - 1] - time_s[first])
+        if duration_s >= SHORTEST_PART_S:
+            chosen.append((first, end))
+            left_s -= duration_s
+    return given, sorted(chosen)
 
 
 def thinned(time_s: Samples, part: Part) -> NDArray[np.int64]:

@@ -80,7 +80,8 @@ def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
         held = _GainsAt(log, begin.time_s)
         kept, end = _kept(log, time_s, begin, held, stood, down)
         if kept.stop - kept.start >= MIN_SAMPLES:
-            ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
+            first, past = _between(time_s, begin.time_s - _BEFORE_S, begin.time_s)
+            ground_m = float(altitude_m[first:past].mean() if past > first else altitude_m[stood])
             record = _Record(log, begin, end, ground_m, held)
             found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
         free_from_s = float(time_s[down])
@@ -234,11 +235,6 @@ def _between(time_s: Samples, first_s: float, last_s: float) -> tuple[int, int]:
     """Index of the first sample of an interval, and the one past its last."""
     first = int(np.searchsorted(time_s, first_s))
     return first, max(first, int(np.searchsorted(time_s, last_s, side="right")))
-
-
-def _ground_m(time_s: Samples, altitude_m: Samples, begin_s: float, stood: int) -> float:
-    first, past = _between(time_s, begin_s - _BEFORE_S, begin_s)
-    return float(altitude_m[first:past].mean() if past > first else altitude_m[stood])
 
 
 class _GainsAt:

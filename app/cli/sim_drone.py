@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from types import FrameType
 
+from app.autopilots.simulated_kinds import SIMULATED
 from app.cli.console import console
 from app.common.errors import InputError, Problem
 from app.core.clock import ScaledClock
-from app.simdrone.catalogue import AUTOPILOTS, get_autopilot, new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server, parse_fault
 from app.simdrone.motion_capture import open_outlet
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
@@ -36,7 +37,7 @@ def run_sim_drone(
 
     Raises InputError for settings that cannot be used, and LinkError when the link cannot be opened.
     """
-    kind = get_autopilot(autopilot or next(iter(AUTOPILOTS)))
+    kind = get_autopilot(autopilot or next(iter(SIMULATED)))
     address = parse(link or kind.link)
     seen_at = None if mocap is None else parse_source(mocap)
     if not any_network:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from enum import StrEnum
+from operator import methodcaller
 from typing import BinaryIO, Final
 
 from app.logs.dataflash import is_dataflash
@@ -38,18 +39,14 @@ def is_ground_log(head: bytes) -> bool:
     return bool(_GROUND_LOG_LINE.match(head))
 
 
-def _begins_with(first: bytes) -> Callable[[bytes], bool]:
-    return lambda head: head.startswith(first)
-
-
 _KINDS: Final[tuple[tuple[Format, Callable[[bytes], bool]], ...]] = (
     (Format.TLOG, is_tlog),
     (Format.DATAFLASH, is_dataflash),
     (Format.ULOG, is_ulog),
     (Format.GROUND_LOG, is_ground_log),
-    (Format.GZIP, _begins_with(b"\x1f\x8b")),
-    (Format.ZIP, _begins_with(b"PK\x03\x04")),
-    (Format.DATAFLASH_TEXT, _begins_with(b"FMT, ")),
+    (Format.GZIP, methodcaller("startswith", b"\x1f\x8b")),
+    (Format.ZIP, methodcaller("startswith", b"PK\x03\x04")),
+    (Format.DATAFLASH_TEXT, methodcaller("startswith", b"FMT, ")),
 )
 
 

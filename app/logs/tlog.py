@@ -1,7 +1,6 @@
 """Frames of telemetry logs (.tlog): both directions of a MAVLink connection, each preceded by its time in µs."""
 
 import re
-import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -53,16 +52,6 @@ class Message:
         return raw.partition(b"\0")[0].decode("ascii", "replace") if isinstance(raw, bytes) else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    """Fields of a message on the wire, and the byte that its checksum begins with."""
-
-    name: str
-    extra: bytes
-    unpacker: struct.Struct
-    fields: tuple[str, ...]
-
-
 def is_tlog(head: bytes) -> bool:
     """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame."""
     return (
@@ -87,27 +76,28 @@ def frames(data: Contents) -> Iterator[Frame]:
 
 def messages(data: Contents, dialect: ModuleType, names: Collection[str]) -> Iterator[Message]:
     """Every message with one of these names and a correct checksum, of any sender."""
-    numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in names}
-    layouts = {number: _layout(dialect, name) for name, number in numbers.items() if number is not None}
+    wanted = [number for number, known in dialect.mavlink_map.items() if known.msgname in names]
+    fields = {number: _fields(dialect, number) for number in wanted}
     for frame in frames(data):
-        layout = layouts.get(frame.message)
-        if layout is None:
+        if frame.message not in fields:
             continue
+        known = dialect.mavlink_map[frame.message]
         past = frame.payload + data[frame.start + 1]
         checksum = int.from_bytes(data[past : past + 2], "little")
-        if dialect.x25crc(data[frame.start + 1 : past] + layout.extra).crc == checksum:
-            size = layout.unpacker.size  # MAVLink 2 truncates trailing zeros
+        if dialect.x25crc(data[frame.start + 1 : past] + bytes([known.crc_extra])).crc == checksum:
+            size = known.unpacker.size  # MAVLink 2 truncates trailing zeros
             payload = data[frame.payload : past][:size].ljust(size, b"\0")
-            fields = dict(zip(layout.fields, layout.unpacker.unpack(payload), strict=True))
+            values = dict(zip(fields[frame.message], known.unpacker.unpack(payload), strict=True))
             stamp_s = int.from_bytes(data[frame.start - _STAMP_BYTES : frame.start], "big") / 1e6
-            yield Message(layout.name, frame.system, frame.component, stamp_s, payload, fields)
+            yield Message(known.msgname, frame.system, frame.component, stamp_s, payload, values)
 
 
-def _layout(dialect: ModuleType, name: str) -> _Layout:
-    defined = getattr(dialect, f"MAVLink_{name.lower()}_message")
-    lengths = zip(defined.ordered_fieldnames, defined.lengths, strict=True)
-    fields = ([field] if length == 1 else [f"{field}[{place}]" for place in range(length)] for field, length in lengths)
-    return _Layout(name, bytes([defined.crc_extra]), defined.unpacker, tuple(chain.from_iterable(fields)))
+def _fields(dialect: ModuleType, number: int) -> list[str]:
+    """The names of a message's values on the wire."""
+    known = dialect.mavlink_map[number]
+    lengths = zip(known.ordered_fieldnames, known.lengths, strict=True)
+    names = ([name] if length == 1 else [f"{name}[{place}]" for place in range(length)] for name, length in lengths)
+    return list(chain.from_iterable(names))
 
 
 def _frame_at(data: Contents, start: int, size: int) -> Frame | None:

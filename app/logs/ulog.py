@@ -72,11 +72,6 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], parameters: C
     )
 
 
-def has_rows(table: Table) -> bool:
-    """Whether a topic was logged."""
-    return "timestamp" in table and len(table["timestamp"]) > 0
-
-
 @dataclass(slots=True)
 class _LogFilter:
     """Filters the messages of a log. `damages` counts the sections that were skipped; `is_cut_off` tells that the last

@@ -1,4 +1,4 @@
-"""What simulated drones are made of: the registry of simulated autopilots, and airframes, the simulations of vehicle
+"""What simulated drones are made of: simulated autopilots by their names, and airframes, the simulations of vehicle
 kinds as the flights of a body."""
 
 from collections.abc import Callable, Mapping
@@ -8,8 +8,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from app.autopilots import registry
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_STEPS, Body, SimulatedKind, VerticalCommand
+from app.autopilots.simulated_kinds import SIMULATED
 from app.core.control.vertical_guidance import Z_SUM_ERR
 from app.core.errors import InputError, Problem
 from app.vehicles.base import OptionValue, VehicleError
@@ -19,20 +19,16 @@ from app.vehicles.kinds import VehicleKind
 from app.vehicles.simulated import Simulation
 from app.vehicles.twin import TWIN, TwinFlight
 
-AUTOPILOTS: Final[Mapping[str, SimulatedKind]] = MappingProxyType(
-    {kind.name: kind for autopilot in registry.AUTOPILOTS.values() for kind in autopilot.simulated()}
-)
-
 
 def get_autopilot(name: str) -> SimulatedKind:
     """Return the autopilot of this name. Raises InputError if it is unknown."""
-    if name not in AUTOPILOTS:
+    if name not in SIMULATED:
         raise InputError(
             "This simulated autopilot is unknown.",
-            problems=(Problem("autopilot", f"must be one of {', '.join(AUTOPILOTS)}, got {name!r}"),),
+            problems=(Problem("autopilot", f"must be one of {', '.join(SIMULATED)}, got {name!r}"),),
             hint="gainline sim-drone --help lists them.",
         )
-    return AUTOPILOTS[name]
+    return SIMULATED[name]
 
 
 class Simulated(Simulation, Protocol):

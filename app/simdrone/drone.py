@@ -63,7 +63,7 @@ class Drone:
         self._outlet = outlet
         self.autopilot = switch_on(body)
         self._switch_on = switch_on
-        self._planned = [(plan, FAULTS[plan.fault]()) for plan in faults]
+        self._planned = list(faults)
         self._active: list[tuple[PlannedFault, Fault]] = []
         self._codecs: dict[tuple[str, int], Codec] = {}
         self._ticks = 0
@@ -77,7 +77,7 @@ class Drone:
 
     def inject_fault(self, fault: str, duration_s: float = float("inf")) -> None:
         """Begin a fault of `FAULTS` with the next tick."""
-        self._planned.append((PlannedFault(fault, None, self.time_s + duration_s), FAULTS[fault]()))
+        self._planned.append(PlannedFault(fault, None, self.time_s + duration_s))
 
     def receive(self, data: bytes) -> None:
         """Process bytes received over the link."""
@@ -115,20 +115,20 @@ class Drone:
     def _begin_and_end_faults(self) -> None:
         """Begin and end faults at their times; each occurs once."""
         now_s, takeoff_s = self.time_s, self._takeoff_s
-        for entry in [each for each in self._planned if each[0].is_active(now_s, takeoff_s)]:
-            self._planned.remove(entry)
-            self._active.append(entry)
-            entry[1].begin(self)
+        for plan in [each for each in self._planned if each.is_active(now_s, takeoff_s)]:
+            self._planned.remove(plan)
+            self._active.append((plan, FAULTS[plan.fault](self)))
         for entry in [each for each in self._active if not each[0].is_active(now_s, takeoff_s)]:
             self._active.remove(entry)
-            entry[1].end(self)
+            entry[1].end()
 
     def _packed(self, message: OutgoingMessage) -> bytes:
         system = message.system or self.autopilot.system
         key = (message.counter, system)
         if key not in self._codecs:
             self._codecs[key] = self.autopilot.dialect.codec(system=system, component=self.autopilot.component)
-        return self._codecs[key].pack(self.autopilot.dialect.message(message.kind, message.fields))
+        dialect, kind = self.autopilot.dialect, message.kind
+        return self._codecs[key].pack(dialect.message(kind, {**dialect.zeros(kind), **message.fields}))
 
 
 CATCH_UP_S: Final = 2.0

@@ -2,11 +2,11 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import ClassVar, Final, Protocol
 
 from app.autopilots.dialects import FieldValue
 from app.autopilots.simulated.body import TICK_S, Body, Fields, OutgoingMessage, SimulatedAutopilot
@@ -36,15 +36,15 @@ class FaultTarget(Protocol):
     def reboot(self) -> None: ...
 
 
+@dataclass
 class Fault:
-    """Base of all faults, without effect; faults override what they change."""
+    """Base of all faults of a drone from their beginning to their end, without effect; faults override what they
+    change."""
 
-    receives_nothing = False
+    drone: FaultTarget
+    receives_nothing: ClassVar[bool] = False
 
-    def begin(self, drone: FaultTarget) -> None:
-        """Begin the fault."""
-
-    def end(self, drone: FaultTarget) -> None:
+    def end(self) -> None:
         """End the fault."""
 
     def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
@@ -56,20 +56,20 @@ class Fault:
         return list(frames)
 
 
+@dataclass
 class MissingMessages(Fault):
     """Messages of some kinds are not sent."""
 
-    def __init__(self, *kinds: str) -> None:
-        self._kinds = kinds
+    kinds: Collection[str]
 
     def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [message for message in messages if message.kind not in self._kinds]
+        return [message for message in messages if message.kind not in self.kinds]
 
 
 class ChangedMessages(Fault, ABC):
     """Messages of some kinds, by default positions, have other values."""
 
-    kinds: tuple[str, ...] = (_POSITION,)
+    kinds: ClassVar[Collection[str]] = (_POSITION,)
 
     def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [
@@ -90,11 +90,11 @@ class Switched(Fault):
 
     switch: Callable[[FaultTarget, bool], None]
 
-    def begin(self, drone: FaultTarget) -> None:
-        self.switch(drone, True)
+    def __post_init__(self) -> None:
+        self.switch(self.drone, True)
 
-    def end(self, drone: FaultTarget) -> None:
-        self.switch(drone, False)
+    def end(self) -> None:
+        self.switch(self.drone, False)
 
 
 def _take_over(drone: FaultTarget, on: bool) -> None:
@@ -107,32 +107,13 @@ def _fly_home(drone: FaultTarget, on: bool) -> None:
     (drone.autopilot.fly_home if on else drone.autopilot.hand_back)()
 
 
-def _ignore_parameters(drone: FaultTarget, on: bool) -> None:
-    drone.autopilot.ignores_parameters = on
-
-
-def _refuse_arming(drone: FaultTarget, on: bool) -> None:
-    drone.autopilot.refuses_arming = on
-
-
-def _stop_motors(drone: FaultTarget, on: bool) -> None:
-    drone.body.motors_dead = on
+def _flag(part: str, name: str) -> Callable[[FaultTarget, bool], None]:
+    """Sets a flag of a part of the drone."""
+    return lambda drone, on: setattr(getattr(drone, part), name, on)
 
 
 def _carry_away(drone: FaultTarget, on: bool) -> None:
     drone.body.wind_m_s = _WIND_M_S if on else 0.0
-
-
-def _blind(drone: FaultTarget, on: bool) -> None:
-    drone.cameras.blind = on
-
-
-def _freeze(drone: FaultTarget, on: bool) -> None:
-    drone.cameras.stuck = on
-
-
-def _drift(drone: FaultTarget, on: bool) -> None:
-    drone.cameras.drifts = on
 
 
 class Deaf(Fault):
@@ -186,14 +167,10 @@ class DriftingAltitude(ChangedMessages):
     """Altitude and climb rate drift down from the true ones by so much, until they show the ground."""
 
     drift_m_s: float
-    _body: Body | None = None
     _since_ms: float | None = None
 
-    def begin(self, drone: FaultTarget) -> None:
-        self._body = drone.body
-
     def change(self, message: OutgoingMessage) -> Fields:
-        boot_ms, height_m = _value(message, "time_boot_ms"), 0.0 if self._body is None else self._body.altitude_m
+        boot_ms, height_m = _value(message, "time_boot_ms"), self.drone.body.altitude_m
         self._since_ms = boot_ms if self._since_ms is None else self._since_ms
         sunk_m = self.drift_m_s * (boot_ms - self._since_ms) / 1000.0
         if sunk_m > height_m:
@@ -276,13 +253,9 @@ class WrongSystem(Fault):
 class GroundDrift(ChangedMessages):
     """The altitude sent rises by 0.45 m within 3.6 s of arming while the drone stands, and sinks as fast afterwards."""
 
-    _drone: FaultTarget | None = None
     _risen_s: float = 0.0
     _error_m: float = 0.0
     _rate_m_s: float = 0.0
-
-    def begin(self, drone: FaultTarget) -> None:
-        self._drone = drone
 
     def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         self._rate_m_s = self._drift_m_s()
@@ -295,8 +268,8 @@ class GroundDrift(ChangedMessages):
 
     def _drift_m_s(self) -> float:
         """Return the rate of the error: upwards for as long as it stands armed, at most `_GROUND_DRIFT_S`."""
-        drone, speed_m_s = self._drone, _GROUND_DRIFT_M / _GROUND_DRIFT_S
-        if drone is None or not drone.autopilot.armed:
+        drone, speed_m_s = self.drone, _GROUND_DRIFT_M / _GROUND_DRIFT_S
+        if not drone.autopilot.armed:
             self._risen_s = 0.0
         elif drone.body.stands and self._risen_s < _GROUND_DRIFT_S:
             self._risen_s += TICK_S
@@ -304,34 +277,34 @@ class GroundDrift(ChangedMessages):
         return -speed_m_s
 
 
-FAULTS: Final[Mapping[str, Callable[[], Fault]]] = MappingProxyType(
+FAULTS: Final[Mapping[str, Callable[[FaultTarget], Fault]]] = MappingProxyType(
     {
-        "no-heartbeat": partial(MissingMessages, "HEARTBEAT"),
-        "param-unconfirmed": partial(Switched, _ignore_parameters),
-        "arm-refused": partial(Switched, _refuse_arming),
-        "no-lift-off": partial(Switched, _stop_motors),
+        "no-heartbeat": partial(MissingMessages, kinds=("HEARTBEAT",)),
+        "param-unconfirmed": partial(Switched, switch=_flag("autopilot", "ignores_parameters")),
+        "arm-refused": partial(Switched, switch=_flag("autopilot", "refuses_arming")),
+        "no-lift-off": partial(Switched, switch=_flag("body", "motors_dead")),
         "link-lost": LinkLost,
         "deaf": Deaf,
-        "ack-lost": partial(MissingMessages, "MISSION_ACK"),
-        "silent-witness": partial(MissingMessages, "SCRIPT_CURRENT", "EXTENDED_SYS_STATE"),
-        "taken-over": partial(Switched, _take_over),
-        "foreign-kill": partial(Switched, lambda drone, on: drone.autopilot.kill() if on else None),
-        "flies-home": partial(Switched, _fly_home),
+        "ack-lost": partial(MissingMessages, kinds=("MISSION_ACK",)),
+        "silent-witness": partial(MissingMessages, kinds=("SCRIPT_CURRENT", "EXTENDED_SYS_STATE")),
+        "taken-over": partial(Switched, switch=_take_over),
+        "foreign-kill": partial(Switched, switch=lambda drone, on: drone.autopilot.kill() if on else None),
+        "flies-home": partial(Switched, switch=_fly_home),
         "frozen-position": FrozenPosition,
         "jumping-position": JumpingPosition,
         "stuck-altitude": StuckAltitude,
-        "drifting-altitude": partial(DriftingAltitude, 0.5),
-        "creeping-altitude": partial(DriftingAltitude, 0.1),
+        "drifting-altitude": partial(DriftingAltitude, drift_m_s=0.5),
+        "creeping-altitude": partial(DriftingAltitude, drift_m_s=0.1),
         "lean-oscillation": LeanOscillation,
         "low-battery": LowBattery,
-        "reboot": partial(Switched, lambda drone, on: drone.reboot() if on else None),
+        "reboot": partial(Switched, switch=lambda drone, on: drone.reboot() if on else None),
         "duplicated-packets": DuplicatedPackets,
         "reordered-packets": ReorderedPackets,
         "wrong-system": WrongSystem,
-        "carried-away": partial(Switched, _carry_away),
-        "mocap-lost": partial(Switched, _blind),
-        "mocap-frozen": partial(Switched, _freeze),
-        "mocap-drift": partial(Switched, _drift),
+        "carried-away": partial(Switched, switch=_carry_away),
+        "mocap-lost": partial(Switched, switch=_flag("cameras", "blind")),
+        "mocap-frozen": partial(Switched, switch=_flag("cameras", "stuck")),
+        "mocap-drift": partial(Switched, switch=_flag("cameras", "drifts")),
         "ground-drift": GroundDrift,
     }
 )

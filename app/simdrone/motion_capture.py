@@ -194,14 +194,14 @@ def _packet(kind: int, payload: bytes) -> bytes:
 
 def _vision(sample: MocapFrame) -> dict[str, FieldValue]:
     x, y, z = sample.position_m
-    return {"usec": round(sample.time_s * 1e6), "x": x, "y": y, "z": -z, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
+    return {"usec": round(sample.time_s * 1e6), "x": x, "y": y, "z": -z}
 
 
 def _odometry(sample: MocapFrame) -> dict[str, FieldValue]:
     x, y, z = sample.position_m
     unknown = [float("nan"), *(0.0 for _ in range(20))]
-    still = dict.fromkeys(("vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
     return {
+        **COMMON.zeros("ODOMETRY"),
         "time_usec": round(sample.time_s * 1e6),
         "frame_id": 1,
         "child_frame_id": 12,
@@ -209,7 +209,6 @@ def _odometry(sample: MocapFrame) -> dict[str, FieldValue]:
         "y": y,
         "z": -z,
         "q": [1.0, 0.0, 0.0, 0.0],
-        **still,
         "pose_covariance": unknown,
         "velocity_covariance": unknown,
         "quality": 100 if sample.tracked else -1,

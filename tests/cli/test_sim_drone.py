@@ -10,8 +10,8 @@ import pytest
 from pymavlink.dialects.v10 import paparazzi as mavlink
 from typer.testing import CliRunner, Result
 
+from app.autopilots.simulated_kinds import SIMULATED
 from app.cli.commands import app
-from app.simdrone.catalogue import AUTOPILOTS
 from app.simdrone.fault_kinds import FAULTS
 from tests.waiting import Waits
 
@@ -64,6 +64,6 @@ def test_what_cannot_be_had_is_refused_in_words(arguments: list[str], words: str
     assert words in result.stderr
 
 
-@pytest.mark.parametrize("name", [*AUTOPILOTS, *FAULTS])
+@pytest.mark.parametrize("name", [*SIMULATED, *FAULTS])
 def test_every_autopilot_and_every_fault_is_in_its_document(name: str) -> None:
     assert f"| `{name}` |" in DOCUMENT

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.replica.parameters import Parameters
 from app.autopilots.px4.replica.replay import LoopLog, replica_of
-from app.autopilots.px4.replica.vertical import FLIGHT
 from app.autopilots.px4.replica_check import px4_loop_log
 from app.core.errors import InputError
 from tests.logs.recorded import recorded
@@ -35,11 +34,11 @@ def test_rows_and_parameters_are_those_of_the_flight() -> None:
     assert asdict(log.parameters) == pytest.approx(asdict(Parameters(velocity_p_1_s=4.2)))
     row_s = log.time_s[log.place] - log.time_s[0]
     assert (row_s[0], row_s[-1]) == pytest.approx((1.104, 17.904), abs=0.01)
-    assert row_s[log.takeoff == FLIGHT][0] == pytest.approx(4.096, abs=0.01)
+    assert row_s[log.flying][0] == pytest.approx(4.096, abs=0.01)
     assert np.median(np.diff(log.time_s)) == pytest.approx(0.008)
     assert np.diff(row_s).max() < 0.11
     assert (log.limit_up_m_s.max(), log.limit_down_m_s.max()) == pytest.approx((3.6, 1.8))
-    assert log.ground_contact[row_s > 16.0].all()
+    assert not log.flying[row_s > 16.0].any()
 
 
 def test_the_log_of_the_real_binary_follows_from_the_replica() -> None:
@@ -74,7 +73,7 @@ def test_hover_thrust_is_the_parameter_until_an_estimate_is_valid() -> None:
 def test_without_a_message_what_depends_on_it_is_not_computed(topic: bytes, signal: str) -> None:
     log = read((topic, topic.replace(b"t", b"x")))
     computed = np.isfinite(replica_of(log)[signal])
-    assert not computed[log.takeoff == FLIGHT].any()
+    assert not computed[log.flying].any()
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, throttle_command
+from app.autopilots.simulated_kinds import SIMULATED
 from app.core.control.vertical_guidance import RATE_HZ
 from app.core.errors import InputError
-from app.simdrone.catalogue import AUTOPILOTS, get_autopilot, new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import CATCH_UP_S
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
@@ -62,7 +63,7 @@ def extreme_messages(mavlink: Any, system: int, random: Random) -> Iterator[byte
 
 @pytest.mark.parametrize(
     "autopilot",
-    [pytest.param(each, marks=pytest.mark.complete) if each == "ardupilot-4.7" else each for each in AUTOPILOTS],
+    [pytest.param(each, marks=pytest.mark.complete) if each == "ardupilot-4.7" else each for each in SIMULATED],
 )
 def test_nothing_that_a_ground_station_can_say_ends_it(autopilot: str) -> None:
     kind = get_autopilot(autopilot)

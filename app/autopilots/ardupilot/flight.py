@@ -88,7 +88,7 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         refused,
         ("PSCD", none_found),
         ArduPilotLoop.space.bounds,
-        _is_missing,
+        lambda gain: f"is missing, and {next(iter(in_newer_names({gain: 0.0})))} of release 4.7 too",
     )
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
     rate_hz = given.get(LOOP_RATE, LOOP_RATE_HZ)
@@ -104,11 +104,6 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         ),
         segments=[rows.part(thinned(time_s, part)) for part in chosen],
     )
-
-
-def _is_missing(gain: str) -> str:
-    (newer,) = in_newer_names({gain: 0.0})
-    return f"is missing, and {newer} of release 4.7 too"
 
 
 def _rows(recording: Recording, lean: Samples, throttle: Sequence[Samples]) -> Segment:

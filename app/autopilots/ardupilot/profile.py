@@ -8,9 +8,8 @@ from app.autopilots.ardupilot.experiments import EXPERIMENTS, GAINS
 from app.autopilots.ardupilot.replica.parameters import LOOP_NAMES, NEWER_NAMES, SINCE_4_7, UNSUPPORTED
 from app.autopilots.autopilot import Autopilot, Requirement, on_board
 from app.autopilots.commands import Action, Setting, Step, Target
-from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
-from app.autopilots.measurements import Measurement
-from app.autopilots.simulated.body import SimulatedKind
+from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, number
+from app.autopilots.measurements import AltitudeError
 
 GUIDED: Final = 4
 LAND: Final = 9
@@ -40,16 +39,6 @@ def _steps(action: Action, target: Target) -> tuple[Step, ...]:
     steps = commands.copter_steps(action, target, LAND)
     guided = Step((commands.set_mode(target, GUIDED),), awaits="command 176")
     return (guided, *steps) if action is Action.ARM else steps
-
-
-def _heartbeat(message: Message) -> Measurement | None:
-    return mavlink.heartbeat(message, f"{number(message, 'custom_mode'):.0f}")
-
-
-def _simulated() -> tuple[SimulatedKind, ...]:
-    from app.autopilots.ardupilot.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
-
-    return KINDS
 
 
 ARDUPILOT: Final = Autopilot(
@@ -94,15 +83,14 @@ ARDUPILOT: Final = Autopilot(
     set_point_settings=(Setting("MOT_HOVER_LEARN", 0.0),),
     readers={
         **mavlink.READERS,
-        "HEARTBEAT": _heartbeat,
-        "NAV_CONTROLLER_OUTPUT": mavlink.altitude_error,
+        "HEARTBEAT": lambda message: mavlink.heartbeat(message, f"{number(message, 'custom_mode'):.0f}"),
+        "NAV_CONTROLLER_OUTPUT": lambda message: AltitudeError(number(message, "alt_error")),
         "POSITION_TARGET_LOCAL_NED": mavlink.target_altitude,
         "ATTITUDE_TARGET": mavlink.commanded_throttle,
     },
     telemetry=commands.COPTER_TELEMETRY,
     set_point_telemetry=(commands.ALTITUDE_ERROR, commands.FOLLOWED_TARGET, commands.DEMANDED_THROTTLE),
     steps=_steps,
-    simulated=_simulated,
 )
 """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth. It does not arm
 without an integral gain of the acceleration. The hover throttle is not learned in flights with several set points: the

@@ -3,7 +3,6 @@
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from itertools import groupby
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
@@ -21,7 +20,7 @@ from app.autopilots.ardupilot.replica.parameters import (
 )
 from app.autopilots.ardupilot.replica.replay import Hover, LoopLog, LoopTrace, replayed, replica_of
 from app.autopilots.ardupilot.replica.vertical import INPUTS, OUTPUTS
-from app.autopilots.recording import Column, Recording, refusal
+from app.autopilots.recording import Column, Recording, Span, refusal, spans_of
 from app.autopilots.replica_check import (
     LoopReplica,
     Replay,
@@ -152,7 +151,7 @@ def ardupilot_loop_log(recording: Recording, *, name: str) -> LoopLog:
     z, z_d, v, v_d, a_d, v_t = (columns[each].values for each in _MOTION)
     known = np.isfinite(np.sum((z, z_d, v, v_d, a_d, v_t), axis=0))
     started_anew = (z_d == z) & (v_d == v)
-    rows, begin_s, end_s = _longest_in_guided(recording, np.flatnonzero(known & ~started_anew))
+    rows, guided = _longest_in_guided(recording, np.flatnonzero(known & ~started_anew))
     if not rows.size:
         raise refused("PSCD", "has no row in flight in GUIDED, the mode that the replica computes")
     time_s = columns["altitude_m"].time_s[rows]
@@ -177,20 +176,16 @@ def ardupilot_loop_log(recording: Recording, *, name: str) -> LoopLog:
         control_per_mille=np.sum([logged(f"control_{term}") for term in TERMS], axis=0),
         throttle=logged("demanded_throttle"),
         limited=(np.nan_to_num(logged("control_Flags")).astype(np.int64) & _LIMITED) > 0,
-        targets=tuple(target for target in _targets(columns, values) if begin_s <= target[0] < end_s),
+        targets=tuple(target for target in _targets(columns, values) if guided.begin_s <= target[0] < guided.end_s),
     )
 
 
-def _longest_in_guided(recording: Recording, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], float, float]:
-    """Those of `rows` in the time in GUIDED that has most of them, and its begin and end, s."""
+def _longest_in_guided(recording: Recording, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], Span]:
+    """Those of `rows` in the time in GUIDED that has most of them, and this time."""
     time_s, mode = recording.columns["altitude_m"].time_s[rows], recording.columns.get("mode")
-    changes = [] if mode is None else list(zip(mode.time_s.tolist(), mode.values.tolist(), strict=True))
-    begins = [next(same) for _, same in groupby(changes, key=lambda change: change[1])]
-    ends_s = [*(begin_s for begin_s, _ in begins), np.inf][1:]
-    found = [(rows[:0], 0.0, 0.0)]
-    for (begin_s, number), end_s in zip(begins, ends_s, strict=True):
-        if number == _GUIDED:
-            found.append((rows[(time_s >= begin_s) & (time_s < end_s)], begin_s, end_s))
+    modes = [] if mode is None else zip(mode.time_s.tolist(), (mode.values == _GUIDED).tolist(), strict=True)
+    spans = [Span(0.0, 0.0), *spans_of(modes)]
+    found = [(rows[(time_s >= each.begin_s) & (time_s < each.end_s)], each) for each in spans]
     return max(found, key=lambda each: len(each[0]))
 
 

@@ -59,15 +59,7 @@ _COMMON: Final = (
 
 
 _DEFAULTS: Final = loop.Parameters(hover_throttle=_HOVER_THROTTLE).named | dict.fromkeys(loop.UNSUPPORTED, 0.0)
-_LOOP: Final = tuple(real(name, value) for name, value in _DEFAULTS.items())
 """Parameters of the vertical loop, by their names until 4.6, with the firmware's defaults."""
-
-
-def _renamed(parameter: Parameter) -> Parameter:
-    """Return the parameter by the name and in the unit that it has since 4.7."""
-    [(name, value)] = loop.in_newer_names({parameter.name: parameter.default}).items()
-    return replace(parameter, name=name, default=value)
-
 
 _GROUND_STATION: Final = "SYSID_MYGCS"
 _GROUND_STATION_4_7: Final = "MAV_GCS_SYSID"
@@ -84,7 +76,7 @@ class ArduPilot(Copter):
             Parameter("SYSID_THISMAV", Kind.INT16, 1),
             Parameter(_GROUND_STATION, Kind.INT16, 255),
             *_COMMON,
-            *_LOOP,
+            *(real(name, value) for name, value in _DEFAULTS.items()),
         ),
         periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
         streams=(
@@ -118,6 +110,7 @@ class ArduPilot(Copter):
         not_landed="Disarm: not landed",
         link_lost="GCS Failsafe",
         fence_breached="Max Alt fence breached",
+        idle_limit="DISARM_DELAY",
         ground_m=0.0,
     )
     ground_station: ClassVar[str] = _GROUND_STATION
@@ -183,9 +176,6 @@ class ArduPilot(Copter):
         reports = self.parameters["FENCE_ACTION"] == _REPORT_ONLY
         return self.parameters["FENCE_ALT_MAX"], Reaction.WARN if reports else Reaction.LAND
 
-    def idle_limit_s(self) -> float:
-        return self.parameters["DISARM_DELAY"]
-
     def counts_heartbeat(self, message: Message) -> bool:
         """Count only heartbeats of its own ground station."""
         return message.get_srcSystem() == self.parameters[self.ground_station]
@@ -201,7 +191,7 @@ class ArduPilot47(ArduPilot):
             Parameter("MAV_SYSID", Kind.INT16, 1),
             Parameter(_GROUND_STATION_4_7, Kind.INT16, 255),
             *_COMMON,
-            *map(_renamed, _LOOP),
+            *(real(name, value) for name, value in loop.in_newer_names(_DEFAULTS).items()),
         ),
     )
     ground_station: ClassVar[str] = _GROUND_STATION_4_7

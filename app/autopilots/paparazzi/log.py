@@ -17,10 +17,11 @@ from xml.parsers import expat
 import numpy as np
 
 from app.autopilots.paparazzi.profile import PAPARAZZI
-from app.autopilots.paparazzi.replica.loop_log import FIELDS, GAINS, FlownGains, LoopLog, flown_gains
+from app.autopilots.paparazzi.replica.loop_log import FIELDS, GAINS, Counts, FlownGains, LoopLog, flown_gains
 from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
 from app.core.control.vertical_guidance import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.policy import Gains
+from app.core.records.trajectory import Samples
 from app.logs.base import refused
 from app.logs.formats import head_of, is_ground_log
 
@@ -32,7 +33,10 @@ _MOST_CANDIDATES: Final = 32
 _PLATEAU_S: Final = 2.0
 _MAX_SAMPLES: Final = 2_000_000
 _MAX_LINE_BYTES: Final = 4096
-_WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
+_LOOP, _POSITION = b"VERT_LOOP", b"ROTORCRAFT_FP"
+_COUNTS: Final[Mapping[bytes, int]] = {_LOOP: len(FIELDS), _POSITION: 6}
+"""Number of the fields that are read, all integers."""
+_WANTED: Final = frozenset({*_COUNTS, b"DL_VALUE"})
 HINT: Final = "Use the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
 
 
@@ -56,7 +60,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
     configuration = _Configuration(lines.aircraft)
     if companion is not None:
         configuration.read(companion, lines.values)
-    loop = lines.loop_log() if lines.loop_time_s else None
+    loop = LoopLog(*lines.samples(_LOOP)) if lines.times_s[_LOOP] else None
     flown = [] if loop is None else flown_gains(loop, configuration.candidates)
     others = ", ".join(sorted(lines.others)[:5])
     return PaparazziRecording(
@@ -80,17 +84,15 @@ class _GroundLog:
 
     aircraft: str = ""
     others: set[str] = field(default_factory=set)
-    loop_time_s: "array[float]" = field(default_factory=lambda: array("d"))
-    loop: "array[int]" = field(default_factory=lambda: array("q"))
-    time_s: "array[float]" = field(default_factory=lambda: array("d"))
-    up: "array[int]" = field(default_factory=lambda: array("q"))
-    up_speed: "array[int]" = field(default_factory=lambda: array("q"))
+    times_s: "dict[bytes, array[float]]" = field(default_factory=lambda: {each: array("d") for each in _COUNTS})
+    counts: "dict[bytes, array[int]]" = field(default_factory=lambda: {each: array("q") for each in _COUNTS})
     values: list[tuple[float, int, float]] = field(default_factory=list)
 
-    def loop_log(self) -> LoopLog:
-        """The samples whose time increases."""
-        time_s, values = np.array(self.loop_time_s), np.array(self.loop, dtype=np.int64).reshape(-1, len(FIELDS))
-        return LoopLog(time_s, values).part(increasing(time_s))
+    def samples(self, message: bytes) -> tuple[Samples, Counts]:
+        """Those of a message whose time increases: time, shape (n,), and its first fields, (n, k)."""
+        time_s, counts = np.array(self.times_s[message]), np.array(self.counts[message], dtype=np.int64)
+        rows = increasing(time_s)
+        return time_s[rows], counts.reshape(-1, _COUNTS[message])[rows]
 
 
 def _read_lines(stream: BinaryIO) -> _GroundLog:
@@ -110,18 +112,13 @@ def _take(lines: _GroundLog, time: bytes, aircraft: str, message: bytes, fields:
     if not np.isfinite(time_s) or (lines.aircraft and aircraft != lines.aircraft):
         lines.others.update([aircraft] if len(lines.others) < 5 and aircraft != lines.aircraft else [])
         return
-    if message == b"VERT_LOOP" and len(lines.loop_time_s) < _MAX_SAMPLES:
-        if (numbers := _whole(fields, len(FIELDS))) is not None:
-            lines.loop_time_s.append(time_s)
-            lines.loop.extend(numbers)
+    if message in _COUNTS:
+        numbers = _whole(fields, _COUNTS[message])
+        if numbers is not None and len(lines.times_s[message]) < _MAX_SAMPLES:
+            lines.times_s[message].append(time_s)
+            lines.counts[message].extend(numbers)
             lines.aircraft = aircraft
-    elif message == b"ROTORCRAFT_FP" and len(lines.time_s) < _MAX_SAMPLES:
-        if (numbers := _whole(fields, 6)) is not None:
-            lines.time_s.append(time_s)
-            lines.up.append(numbers[2])
-            lines.up_speed.append(numbers[5])
-            lines.aircraft = aircraft
-    elif message == b"DL_VALUE" and lines.aircraft and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
+    elif lines.aircraft and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
         number, value = _whole(fields, 1), _number_in(fields[1])
         if number is not None and np.isfinite(value):
             lines.values.append((time_s, number[0], value))
@@ -130,13 +127,12 @@ def _take(lines: _GroundLog, time: bytes, aircraft: str, message: bytes, fields:
 def _columns(lines: _GroundLog, loop: LoopLog | None) -> dict[str, Column]:
     """Columns of the loop, and of the position if its message is more frequent."""
     columns = {} if loop is None else _loop_columns(loop)
-    if len(lines.loop_time_s) >= len(lines.time_s):
+    if len(lines.times_s[_LOOP]) >= len(lines.times_s[_POSITION]):
         return columns
-    rows = increasing(np.array(lines.time_s))
-    time_s = np.array(lines.time_s)[rows]
+    time_s, counts = lines.samples(_POSITION)
     return columns | {
-        "altitude_m": Column(time_s, np.array(lines.up)[rows] / 2**8, "ROTORCRAFT_FP.up"),
-        "climb_rate_m_s": Column(time_s, np.array(lines.up_speed)[rows] / 2**19, "ROTORCRAFT_FP.vup"),
+        "altitude_m": Column(time_s, counts[:, 2] / 2**8, "ROTORCRAFT_FP.up"),
+        "climb_rate_m_s": Column(time_s, counts[:, 5] / 2**19, "ROTORCRAFT_FP.vup"),
     }
 
 

@@ -11,7 +11,6 @@ from app.autopilots.commands import Action, Ask, Outgoing, Step, Target
 from app.autopilots.dialects import PAPARAZZI as DIALECT
 from app.autopilots.dialects import Message, number, text
 from app.autopilots.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
-from app.autopilots.simulated.body import SimulatedKind
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.takeoff import Takeoff
 
@@ -40,7 +39,8 @@ _HOME_NUMBER: Final = 2
 
 
 def _explore(ask: Ask, target: Target) -> Mapping[str, int]:
-    """Request the list of blocks once; the acknowledgement that ends it is sent before every change of block."""
+    """Request the list of blocks once; the acknowledgement that ends it is sent before every change of block, which the
+    listing otherwise prevents for 15 s."""
     counted = ask(Outgoing("SCRIPT_REQUEST_LIST", _to(target)), lambda reply: isinstance(reply, BlockCount))
     if not isinstance(counted, BlockCount):
         raise _without_blocks("It did not list the blocks of its flight plan.")
@@ -57,11 +57,6 @@ def _explore(ask: Ask, target: Target) -> Mapping[str, int]:
 
 def _is_block(number: int, reply: Measurement) -> bool:
     return isinstance(reply, Block) and reply.number == number
-
-
-def _conclude(target: Target) -> tuple[Outgoing, ...]:
-    """Return the end of the listing of blocks, which otherwise prevents every change of block for 15 s."""
-    return (_acknowledge(target),)
 
 
 def _refer_to_ground(target: Target) -> tuple[Step, ...]:
@@ -137,23 +132,6 @@ def _heartbeat(message: Message) -> Measurement | None:
     return mavlink.heartbeat(message, _HOME if is_home else mode)
 
 
-def _taken(message: Message) -> Measurement:
-    result = int(number(message, "type"))
-    return CommandReply("waypoint", result == 0, f"result {result}")
-
-
-def _count(message: Message) -> Measurement:
-    return BlockCount(int(number(message, "count")))
-
-
-def _named(message: Message) -> Measurement:
-    return Block(int(number(message, "seq")), text(message, "name"))
-
-
-def _entered(message: Message) -> Measurement:
-    return BlockEntered(int(number(message, "seq")))
-
-
 def _version(message: Message) -> Version | None:
     """Read the version from decimal digits: 51000 is 5.10.0. Its `uid` is not a hardware id: its simulation also sends
     one."""
@@ -164,18 +142,14 @@ def _version(message: Message) -> Version | None:
 _READERS: Final[mavlink.Readers] = {
     **mavlink.READERS,
     "HEARTBEAT": _heartbeat,
-    "MISSION_ACK": _taken,
-    "SCRIPT_COUNT": _count,
-    "SCRIPT_ITEM": _named,
-    "SCRIPT_CURRENT": _entered,
+    "MISSION_ACK": lambda message: CommandReply(
+        "waypoint", number(message, "type") == 0, f"result {number(message, 'type'):.0f}"
+    ),
+    "SCRIPT_COUNT": lambda message: BlockCount(int(number(message, "count"))),
+    "SCRIPT_ITEM": lambda message: Block(int(number(message, "seq")), text(message, "name")),
+    "SCRIPT_CURRENT": lambda message: BlockEntered(int(number(message, "seq"))),
     "AUTOPILOT_VERSION": _version,
 }
-
-
-def _simulated() -> tuple[SimulatedKind, ...]:
-    from app.autopilots.paparazzi.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
-
-    return KINDS
 
 
 PAPARAZZI: Final = Autopilot(
@@ -220,10 +194,9 @@ PAPARAZZI: Final = Autopilot(
     readers=_READERS,
     reports_version=False,
     steps=_steps,
-    simulated=_simulated,
     holds_first=False,
     explore=_explore,
-    conclude=_conclude,
+    conclude=lambda target: (_acknowledge(target),),
     refer_to_ground=_refer_to_ground,
 )
 """v5.8 or newer, with the `mavlink` module and the blocks of the stock flight plans. It sends its version every few

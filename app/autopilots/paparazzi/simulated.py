@@ -21,7 +21,6 @@ from app.autopilots.paparazzi.simulated_plan import (
     NEWER_KILL_SETTING,
     TAKEOFF,
     WAYPOINTS,
-    Engine,
     FlightPlan,
     Vertical,
     held,
@@ -175,8 +174,8 @@ class Paparazzi(ReportingPaparazzi):
     def _enter(self, seq: int) -> None:
         self._plan.enter(seq, self.height_m)
         self._touched_s = None
-        if self._plan.block.engine is not Engine.LEAVE:
-            self._set_motors(on=self._plan.block.engine is Engine.RESURRECT)
+        if self._plan.block.motors is not None:
+            self._set_motors(on=self._plan.block.motors)
         if self._plan.seq == TAKEOFF:
             self.took_off = True
 
@@ -317,7 +316,7 @@ class Paparazzi(ReportingPaparazzi):
 
     def _on_data_stream(self, message: Message) -> None:
         stream = int(number(message, "req_stream_id"))
-        self._send("DATA_STREAM", {"stream_id": stream, "message_rate": 0, "on_off": 0})
+        self._send("DATA_STREAM", {"stream_id": stream})
 
     def _on_block_list(self, message: Message) -> None:
         self._transaction_ends_s = self.boot_s + TRANSACTION_S
@@ -344,7 +343,7 @@ class Paparazzi(ReportingPaparazzi):
         if not is_waypoint or seq >= len(WAYPOINTS) or not abs(height_m) <= _HIGHEST_M:
             return
         self._plan.altitudes_m[WAYPOINTS[seq]] = height_m
-        self._send("MISSION_ACK", {"type": 0, **sender(message)}, "mission")
+        self._send("MISSION_ACK", sender(message), "mission")
 
     @property
     def _is_listing_blocks(self) -> bool:

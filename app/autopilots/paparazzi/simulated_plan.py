@@ -35,24 +35,17 @@ class Vertical(Enum):
     DESCEND = "down at DESCENT_M_S until it no longer flies"
 
 
-class Engine(Enum):
-    """Effect on the motors of entering a block."""
-
-    LEAVE = "nothing"
-    KILL = "stop"
-    RESURRECT = "start"
-
-
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One block. `after` is the block that follows after `lasts_s`, if any, and not before there is a position if it
-    `waits`; `landed` the one that follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up)
-    and `max_distance_m` (along an axis from HOME) are exceptions that lead to "land here"."""
+    """One block. Entering it starts or stops the `motors`, or leaves them as they are (None). `after` is the block that
+    follows after `lasts_s`, if any, and not before there is a position if it `waits`; `landed` the one that follows
+    when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an axis
+    from HOME) are exceptions that lead to "land here"."""
 
     name: str
     vertical: Vertical = Vertical.WAYPOINT
     waypoint: str = "STDBY"
-    engine: Engine = Engine.LEAVE
+    motors: bool | None = None
     after: str | None = None
     lasts_s: float = 0.0
     waits: bool = False
@@ -63,10 +56,10 @@ class Block:
 
 
 BLOCKS: Final = (
-    Block("Wait GPS", Vertical.THROTTLE, engine=Engine.KILL, after="Geo init", waits=True),
-    Block("Geo init", Vertical.THROTTLE, engine=Engine.KILL, after="Holding point", lasts_s=10.0),
-    Block("Holding point", Vertical.THROTTLE, engine=Engine.KILL),
-    Block("Start Engine", Vertical.THROTTLE, engine=Engine.RESURRECT),
+    Block("Wait GPS", Vertical.THROTTLE, motors=False, after="Geo init", waits=True),
+    Block("Geo init", Vertical.THROTTLE, motors=False, after="Holding point", lasts_s=10.0),
+    Block("Holding point", Vertical.THROTTLE, motors=False),
+    Block("Start Engine", Vertical.THROTTLE, motors=True),
     Block("Takeoff", waypoint="CLIMB", max_time_s=45.0, max_height_m=4.5, max_distance_m=8.0),
     Block("Standby"),
     Block("stay_p1", waypoint="p1"),

@@ -11,9 +11,7 @@ from app.autopilots.simulated.body import (
     Body,
     Fields,
     SimulatedAutopilot,
-    attitude,
-    system_time,
-    version,
+    timed,
     whole_ticks,
 )
 from app.autopilots.simulated.copter_parameters import Parameters
@@ -168,19 +166,6 @@ def heartbeat(now: ReportingPaparazzi) -> Fields:
     }
 
 
-def local_position(now: ReportingPaparazzi) -> Fields:
-    """Return LOCAL_POSITION_NED in steps of the autopilot's integers."""
-    return {
-        "time_boot_ms": now.boot_ms,
-        "x": _stepped(now.north_m, POSITION_BITS),
-        "y": 0.0,
-        "z": -_stepped(now.estimated_m, POSITION_BITS),
-        "vx": _stepped(now.body.north_m_s, SPEED_BITS),
-        "vy": 0.0,
-        "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS) - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
-    }
-
-
 def global_position(now: ReportingPaparazzi) -> Fields:
     """Return GLOBAL_POSITION_INT; as in the real one, `relative_alt` is altitude in mm minus the origin in m."""
     altitude_mm = now.origin_mm + _GEOID_MM + round(now.estimated_m * 1000.0)
@@ -190,81 +175,57 @@ def global_position(now: ReportingPaparazzi) -> Fields:
         "lon": _LONGITUDE_E7,
         "alt": altitude_mm,
         "relative_alt": altitude_mm - now.origin_mm // 1000 - 1,
-        "vx": 0,
-        "vy": 0,
         "vz": round(-now.climb_rate_m_s * 100.0),
         "hdg": 33,
     }
 
 
-def vfr_hud(now: ReportingPaparazzi) -> Fields:
-    """Return VFR_HUD, in which `climb` is positive downwards."""
-    return {
-        "airspeed": 0.0,
-        "groundspeed": 0.0,
-        "heading": 0,
-        "throttle": round(now.body.thrust * 100.0),
-        "alt": (now.origin_mm + _GEOID_MM) / 1000.0 + now.estimated_m,
-        "climb": -now.climb_rate_m_s,
-    }
-
-
-def sys_status(now: ReportingPaparazzi) -> Fields:
-    errors = dict.fromkeys(("errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
-    return {
-        "onboard_control_sensors_present": 15,
-        "onboard_control_sensors_enabled": 15,
-        "onboard_control_sensors_health": 15,
-        "load": 65535,
-        "voltage_battery": now.battery_mv,
-        "current_battery": _current(now),
-        "battery_remaining": -1,
-        "drop_rate_comm": 0,
-        **errors,
-    }
-
-
-def battery_status(now: ReportingPaparazzi) -> Fields:
-    return {
-        "id": 0,
-        "battery_function": 0,
-        "type": 0,
-        "temperature": _NO_TEMPERATURE,
-        "voltages": [now.battery_mv, *[0] * 9],
-        "current_battery": _current(now),
-        "current_consumed": 0,
-        "energy_consumed": 0,
-        "battery_remaining": -1,
-    }
-
-
-def attitude_quaternion(now: ReportingPaparazzi) -> Fields:
-    still = dict.fromkeys(("q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
-    return {"time_boot_ms": now.boot_ms, "q1": 1.0, **still}
-
-
-def global_origin(now: ReportingPaparazzi) -> Fields:
-    return {"latitude": _LATITUDE_E7, "longitude": _LONGITUDE_E7, "altitude": now.origin_mm}
-
-
 MESSAGES: Final[Mapping[str, Callable[[ReportingPaparazzi], Fields]]] = MappingProxyType(
     {
-        "LOCAL_POSITION_NED": local_position,
+        "LOCAL_POSITION_NED": lambda now: {
+            "time_boot_ms": now.boot_ms,
+            "x": _stepped(now.north_m, POSITION_BITS),
+            "z": -_stepped(now.estimated_m, POSITION_BITS),
+            "vx": _stepped(now.body.north_m_s, SPEED_BITS),
+            "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS) - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
+        },
         "HEARTBEAT": heartbeat,
-        "ATTITUDE": attitude,
+        "ATTITUDE": timed,
         "GLOBAL_POSITION_INT": global_position,
-        "SYS_STATUS": sys_status,
-        "VFR_HUD": vfr_hud,
-        "ATTITUDE_QUATERNION": attitude_quaternion,
-        "SYSTEM_TIME": system_time,
-        "BATTERY_STATUS": battery_status,
-        "GPS_GLOBAL_ORIGIN": global_origin,
-        "AUTOPILOT_VERSION": lambda _now: version(51000),
+        "SYS_STATUS": lambda now: {
+            "onboard_control_sensors_present": 15,
+            "onboard_control_sensors_enabled": 15,
+            "onboard_control_sensors_health": 15,
+            "load": 65535,
+            "voltage_battery": now.battery_mv,
+            "current_battery": _current(now),
+            "battery_remaining": -1,
+        },
+        "VFR_HUD": lambda now: {
+            "throttle": round(now.body.thrust * 100.0),
+            "alt": (now.origin_mm + _GEOID_MM) / 1000.0 + now.estimated_m,
+            "climb": -now.climb_rate_m_s,  # positive downwards, as in the real one
+        },
+        "ATTITUDE_QUATERNION": lambda now: {**timed(now), "q1": 1.0},
+        "SYSTEM_TIME": timed,
+        "BATTERY_STATUS": lambda now: {
+            "temperature": _NO_TEMPERATURE,
+            "voltages": [now.battery_mv, *[0] * 9],
+            "current_battery": _current(now),
+            "battery_remaining": -1,
+        },
+        "GPS_GLOBAL_ORIGIN": lambda now: {
+            "latitude": _LATITUDE_E7,
+            "longitude": _LONGITUDE_E7,
+            "altitude": now.origin_mm,
+        },
+        "AUTOPILOT_VERSION": lambda _now: {"flight_sw_version": 51000},
     }
 )
 
 
 def _stepped(value: float, bits: int) -> float:
+    """Return the value in steps of the autopilot's integers."""
     return round(value * (1 << bits)) / (1 << bits)
 
 

@@ -61,10 +61,8 @@ class _Report:
         """Return the failing components; if the chunk is whole, only those with a check for this group of modes."""
         if not self.is_whole or group is None:
             return self.errors
-        about = 0
-        for modes, component in self.checks:
-            about |= 1 << component if modes >> group & 1 else 0
-        return self.errors & about
+        about = {component for modes, component in self.checks if modes >> group & 1}
+        return self.errors & sum(1 << component for component in about)
 
 
 class Px4ArmingChecks(ArmingChecks):

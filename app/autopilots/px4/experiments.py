@@ -111,14 +111,7 @@ class Px4Loop(CopterLoop):
         hover_deviation=HOVER_RANGE_NAME,
     )
     space = GainSpace(
-        bounds=MappingProxyType(
-            {
-                "MPC_Z_P": (0.1, 1.5),
-                "MPC_Z_VEL_P_ACC": (2.0, 15.0),
-                "MPC_Z_VEL_I_ACC": (0.2, 3.0),
-                "MPC_Z_VEL_D_ACC": (0.0, 2.0),
-            }
-        ),
+        bounds=MappingProxyType({gain.name: (gain.lower, gain.upper) for gain in GAINS}),
         gentle=MappingProxyType(
             {"MPC_Z_P": 0.5, "MPC_Z_VEL_P_ACC": 2.0, "MPC_Z_VEL_I_ACC": 0.5, "MPC_Z_VEL_D_ACC": 0.0}
         ),

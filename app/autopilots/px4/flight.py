@@ -99,7 +99,7 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
         Px4Loop.space.bounds,
         lambda _: "is missing",
     )
-    parameters, logged_s = parameters_from(given), recording.columns["altitude_m"].interval_s
+    parameters, logged_s = parameters_from(given), float(np.median(np.diff(recording.columns["altitude_m"].time_s)))
     limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
     hover = _hover(rows, acceleration_target, is_sound & (thrust > limits[0]) & (thrust < limits[1]))
     kept = [thinned(time_s, part) for part in chosen]

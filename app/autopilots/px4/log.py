@@ -23,7 +23,7 @@ from app.autopilots.recording import (
 )
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, rows_of
-from app.logs.ulog import has_rows, read_ulog_tables
+from app.logs.ulog import read_ulog_tables
 
 POSITION, TARGET, SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
 TAKEOFF, STATUS = "takeoff_status", "vehicle_status"
@@ -83,11 +83,12 @@ def read_px4(stream: BinaryIO) -> Recording:
     wanted = {_COMMAND, _ANSWER, *(source.message for source in SOURCES.values())}
     tables = read_ulog_tables(stream, topics=wanted, parameters={*LOOP_NAMES, VEHICLE})
     columns = columns_of(tables.topics, SOURCES, clock="timestamp")
+    arming = columns.get("arming_state")
     recording = Recording(
         title="PX4's log (ULog)",
         autopilot=PX4,
         columns=columns,
-        sources=[topic for topic, table in tables.topics.items() if has_rows(table)],
+        sources=[topic for topic, table in tables.topics.items() if len(table.get("timestamp", ()))],
         settings=[Setting(*each) for each in tables.settings],
         notes=tables.notes,
     )
@@ -95,9 +96,13 @@ def read_px4(stream: BinaryIO) -> Recording:
         recording,
         events=[*_commands(tables.topics), *_changes(recording)],
         in_air=_in_air(recording),
-        armed=_armed(recording),
+        armed=None if arming is None else _spans(arming.time_s, arming.values == _ARMED),
         remarks=list(_remarks(columns)),
     )
+
+
+def _spans(time_s: Samples, holds: Rows) -> list[Span]:
+    return spans_of(zip(time_s.tolist(), holds.tolist(), strict=True))
 
 
 def _commands(topics: Mapping[str, Table]) -> Iterator[Event]:
@@ -146,7 +151,7 @@ def _in_air(recording: Recording) -> list[Span] | None:
         np.concatenate([columns[each].time_s for each in ("is_landed", "arming_state") if each in columns])
     )
     flying = (recording.at("is_landed", time_s) == 0.0) & _may_be_armed(recording, time_s)
-    spans = spans_of(zip(time_s.tolist(), flying.tolist(), strict=True))
+    spans = _spans(time_s, flying)
     modes = recording.at("mode", np.array([span.begin_s for span in spans]))
     touched_s = [-np.inf, *(span.end_s for span in spans)]
     return [
@@ -154,14 +159,6 @@ def _in_air(recording: Recording) -> list[Span] | None:
         for span, before_s, mode in zip(spans, touched_s, modes.tolist(), strict=False)
         if mode not in _COMING_DOWN and span.begin_s - before_s >= _BOUNCE_S
     ]
-
-
-def _armed(recording: Recording) -> list[Span] | None:
-    """Intervals with the motors armed; None if the log does not report them."""
-    arming = recording.columns.get("arming_state")
-    if arming is None:
-        return None
-    return spans_of(zip(arming.time_s.tolist(), (arming.values == _ARMED).tolist(), strict=True))
 
 
 def _remarks(columns: Mapping[str, Column]) -> Iterator[str]:

@@ -21,7 +21,6 @@ from app.autopilots.px4.replica.parameters import (
     hover_deviation,
     hover_limits,
 )
-from app.autopilots.simulated.body import SimulatedKind
 from app.core.errors import InputError
 
 _HOVER: Final = "MPC_THR_HOVER"
@@ -91,12 +90,6 @@ def _event(message: Message) -> VehicleEvent:
     return VehicleEvent(int(number(message, "id")), int(number(message, "sequence")), arguments)
 
 
-def _simulated() -> tuple[SimulatedKind, ...]:
-    from app.autopilots.px4.simulated import KINDS  # noqa: PLC0415 - compiled loops, which only these need
-
-    return KINDS
-
-
 PX4: Final = Autopilot(
     name="px4",
     title="PX4",
@@ -144,7 +137,6 @@ PX4: Final = Autopilot(
     arming_checks=Px4ArmingChecks,
     checks=ChecksRequest(_RUN_PREARM_CHECKS, last=HEALTH_SUMMARY),
     steps=_steps,
-    simulated=_simulated,
     needs_stream=True,
     armable_mode=(_AUTO, _LOITER),
 )

@@ -133,6 +133,7 @@ class Px4(Copter):
         not_landed="Disarming denied: not landed",
         link_lost="GCS connection lost",
         fence_breached="Geofence violated: maximum altitude exceeded",
+        idle_limit="COM_DISARM_PRFLT",
         ground_m=0.51,
         lacks=frozenset({"NAV_CONTROLLER_OUTPUT"}),
     )
@@ -203,8 +204,6 @@ class Px4(Copter):
                 "id": number,
                 "event_time_boot_ms": self.boot_ms,
                 "sequence": self._events % _SEQUENCE_NUMBERS,
-                "destination_component": 0,
-                "destination_system": 0,
                 "log_levels": levels,
                 "arguments": struct.pack(layout, *arguments).ljust(_ARGUMENTS, b"\0"),
             },
@@ -271,9 +270,6 @@ class Px4(Copter):
         if limit_m <= 0.0:
             return math.inf, Reaction.NONE
         return limit_m, _FENCE_ACTIONS.get(int(self.parameters["GF_ACTION"]), Reaction.LAND)
-
-    def idle_limit_s(self) -> float:
-        return self.parameters["COM_DISARM_PRFLT"]
 
 
 KINDS: Final = (

@@ -124,8 +124,8 @@ FAILED: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class OutgoingMessage:
-    """An outgoing message, not yet packed. `counter` names its sequence counter: Paparazzi has one for each of its
-    source files. `system` is the sender's id if it is not the vehicle's own."""
+    """An outgoing message, not yet packed; fields that are not given are 0. `counter` names its sequence counter:
+    Paparazzi has one for each of its source files. `system` is the sender's id if it is not the vehicle's own."""
 
     kind: str
     fields: Fields
@@ -242,27 +242,9 @@ class SimulatedAutopilot(ABC):
             self.send_parameter(place)
 
 
-def attitude(now: SimulatedAutopilot) -> Fields:
-    """Return ATTITUDE, which is level."""
-    return {
-        "time_boot_ms": now.boot_ms,
-        **dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), 0.0),
-    }
-
-
-def system_time(now: SimulatedAutopilot) -> Fields:
-    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
-
-
-def version(flight_software: int, *, capabilities: int = 0, uid: int = 0) -> Fields:
-    """Return AUTOPILOT_VERSION."""
-    return {
-        "capabilities": capabilities,
-        "flight_sw_version": flight_software,
-        "uid": uid,
-        **dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0),
-        **dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8),
-    }
+def timed(now: SimulatedAutopilot) -> Fields:
+    """Return a report of the time since the start alone: SYSTEM_TIME, or ATTITUDE, which is level."""
+    return {"time_boot_ms": now.boot_ms}
 
 
 def sender(message: Message) -> dict[str, int]:

@@ -79,10 +79,6 @@ class Copter(ReportingCopter):
     def fence(self) -> tuple[float, Reaction]:
         """Return the altitude limit, m, and the reaction."""
 
-    @abstractmethod
-    def idle_limit_s(self) -> float:
-        """Return the time for which it stays armed on the ground, s."""
-
     def counts_heartbeat(self, _message: Message) -> bool:
         """Return whether the heartbeat of this ground station counts."""
         return True
@@ -175,7 +171,7 @@ class Copter(ReportingCopter):
         return None if self.mode.may_arm else self.firmware.not_armable
 
     def _watch_idling(self) -> None:
-        limit_s = self.idle_limit_s()
+        limit_s = self.parameters[self.firmware.idle_limit]
         if self.armed and not self.controller.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
             self.kill()
 
@@ -284,8 +280,7 @@ class Copter(ReportingCopter):
         command = int(number(message, "command"))
         handler = _COMMANDS.get(command)
         result = UNSUPPORTED if handler is None else handler(self, message)
-        done = {"command": command, "result": result, "progress": 0, "result_param2": 0}
-        self._send("COMMAND_ACK", {**done, **sender(message)})
+        self._send("COMMAND_ACK", {"command": command, "result": result, **sender(message)})
 
     def _handle_arm(self, message: Message) -> int:
         force = number(message, "param2") == FORCE

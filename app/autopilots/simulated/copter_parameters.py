@@ -144,6 +144,8 @@ class FirmwareProfile:
     not_landed: str
     link_lost: str
     fence_breached: str
+    idle_limit: str
+    """Parameter of the time for which it stays armed on the ground, s."""
     ground_m: float
     """Height of the place of takeoff in the local frame."""
     lacks: frozenset[str] = frozenset()

@@ -11,9 +11,7 @@ from app.autopilots.simulated.body import (
     Body,
     Fields,
     SimulatedAutopilot,
-    attitude,
-    system_time,
-    version,
+    timed,
 )
 from app.autopilots.simulated.copter_control import (
     IGNORED_BY,
@@ -89,43 +87,6 @@ class ReportingCopter(SimulatedAutopilot):
             self._send("STATUSTEXT", {"severity": 2, "text": part, "id": number, "chunk_seq": chunk})
 
 
-def heartbeat(now: ReportingCopter) -> Fields:
-    return {
-        "type": 2,
-        "autopilot": now.firmware.autopilot,
-        "base_mode": now.mode.base_mode | (ARMED if now.armed else 0),
-        "custom_mode": now.mode.custom_mode,
-        "system_status": _ACTIVE if now.controller.flies else _STANDBY,
-        "mavlink_version": 3,
-    }
-
-
-def local_position(now: ReportingCopter) -> Fields:
-    return {
-        "time_boot_ms": now.boot_ms,
-        "x": now.body.north_m,
-        "y": 0.0,
-        "z": -(now.body.altitude_m + now.firmware.ground_m),
-        "vx": now.body.north_m_s,
-        "vy": 0.0,
-        "vz": -now.body.climb_rate_m_s - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
-    }
-
-
-def global_position(now: ReportingCopter) -> Fields:
-    return {
-        "time_boot_ms": now.boot_ms,
-        "lat": LATITUDE_E7,
-        "lon": LONGITUDE_E7,
-        "alt": round((HOME_AMSL_M + now.body.altitude_m) * 1000.0),
-        "relative_alt": round(now.body.altitude_m * 1000.0),
-        "vx": 0,
-        "vy": 0,
-        "vz": round(-now.body.climb_rate_m_s * 100.0),
-        "hdg": 0,
-    }
-
-
 def position_target(now: ReportingCopter) -> Fields:
     """Return POSITION_TARGET_LOCAL_NED: the set point in force, not the shaped one."""
     given = now.controller.set_point
@@ -136,38 +97,7 @@ def position_target(now: ReportingCopter) -> Fields:
         "time_boot_ms": now.boot_ms,
         "coordinate_frame": LOCAL_NED,
         "type_mask": ignored | _IGNORE_HORIZONTAL,
-        **dict.fromkeys(("x", "y", "vx", "vy", "afx", "afy", "yaw", "yaw_rate"), 0.0),
         **{name: 0.0 if name in missing else -value for name, value in up.items()},
-    }
-
-
-def attitude_target(now: ReportingCopter) -> Fields:
-    """Return ATTITUDE_TARGET, which is level."""
-    return {
-        "time_boot_ms": now.boot_ms,
-        "type_mask": 0,
-        "q": [1.0, 0.0, 0.0, 0.0],
-        **dict.fromkeys(("body_roll_rate", "body_pitch_rate", "body_yaw_rate"), 0.0),
-        "thrust": now.controller.demand,
-    }
-
-
-def controller_output(now: ReportingCopter) -> Fields:
-    return {
-        **dict.fromkeys(("nav_bearing", "target_bearing", "wp_dist"), 0),
-        **dict.fromkeys(("nav_roll", "nav_pitch", "aspd_error", "xtrack_error"), 0.0),
-        "alt_error": now.controller.error_m,
-    }
-
-
-def vfr_hud(now: ReportingCopter) -> Fields:
-    return {
-        "airspeed": 0.0,
-        "groundspeed": 0.0,
-        "heading": 0,
-        "throttle": round(now.body.thrust * 100.0),
-        "alt": HOME_AMSL_M + now.body.altitude_m,
-        "climb": now.body.climb_rate_m_s,
     }
 
 
@@ -182,84 +112,84 @@ def sys_status(now: ReportingCopter) -> Fields:
         "voltage_battery": round(now.body.battery_v * 1000.0),
         "current_battery": -1,
         "battery_remaining": now.charge_percent,
-        **dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0),
     }
-
-
-def battery_status(now: ReportingCopter) -> Fields:
-    return {
-        "id": 0,
-        "battery_function": 0,
-        "type": 1,
-        "temperature": 32767,
-        "voltages": [round(now.body.battery_v * 1000.0), *[65535] * 9],
-        "current_battery": -1,
-        "current_consumed": -1,
-        "energy_consumed": -1,
-        "battery_remaining": now.charge_percent,
-    }
-
-
-def gps_raw(now: ReportingCopter) -> Fields:
-    return {
-        "time_usec": round(now.boot_s * 1e6),
-        "fix_type": 3,
-        "lat": LATITUDE_E7,
-        "lon": LONGITUDE_E7,
-        "alt": round((HOME_AMSL_M + now.body.altitude_m) * 1000.0),
-        "eph": 90,
-        "epv": 120,
-        "vel": 0,
-        "cog": 0,
-        "satellites_visible": 12,
-    }
-
-
-def home_position(_now: ReportingCopter) -> Fields:
-    return {
-        "latitude": LATITUDE_E7,
-        "longitude": LONGITUDE_E7,
-        "altitude": round(HOME_AMSL_M * 1000.0),
-        **dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), 0.0),
-        "q": [1.0, 0.0, 0.0, 0.0],
-    }
-
-
-def extended_state(now: ReportingCopter) -> Fields:
-    return {"vtol_state": 0, "landed_state": _LANDED_STATES[now.controller.phase]}
-
-
-def fence_status(now: ReportingCopter) -> Fields:
-    return {
-        "breach_status": int(now.is_breached),
-        "breach_count": now.breaches,
-        "breach_type": _ALTITUDE_BREACH if now.is_breached else 0,
-        "breach_time": 0,
-    }
-
-
-def autopilot_version(now: ReportingCopter) -> Fields:
-    """Return AUTOPILOT_VERSION, with only the implemented capabilities: MAVLink 2 and parameters as floats."""
-    return version(now.firmware.version, capabilities=2 | (1 << 13), uid=now.uid)
 
 
 REPORTS: Final[Mapping[str, Callable[[ReportingCopter], Fields]]] = MappingProxyType(
     {
-        "HEARTBEAT": heartbeat,
+        "HEARTBEAT": lambda now: {
+            "type": 2,
+            "autopilot": now.firmware.autopilot,
+            "base_mode": now.mode.base_mode | (ARMED if now.armed else 0),
+            "custom_mode": now.mode.custom_mode,
+            "system_status": _ACTIVE if now.controller.flies else _STANDBY,
+            "mavlink_version": 3,
+        },
         "SYS_STATUS": sys_status,
-        "SYSTEM_TIME": system_time,
-        "GPS_RAW_INT": gps_raw,
-        "ATTITUDE": attitude,
-        "LOCAL_POSITION_NED": local_position,
-        "GLOBAL_POSITION_INT": global_position,
-        "NAV_CONTROLLER_OUTPUT": controller_output,
-        "VFR_HUD": vfr_hud,
-        "ATTITUDE_TARGET": attitude_target,
+        "SYSTEM_TIME": timed,
+        "GPS_RAW_INT": lambda now: {
+            "time_usec": round(now.boot_s * 1e6),
+            "fix_type": 3,
+            "lat": LATITUDE_E7,
+            "lon": LONGITUDE_E7,
+            "alt": round((HOME_AMSL_M + now.body.altitude_m) * 1000.0),
+            "eph": 90,
+            "epv": 120,
+            "satellites_visible": 12,
+        },
+        "ATTITUDE": timed,
+        "LOCAL_POSITION_NED": lambda now: {
+            "time_boot_ms": now.boot_ms,
+            "x": now.body.north_m,
+            "z": -(now.body.altitude_m + now.firmware.ground_m),
+            "vx": now.body.north_m_s,
+            "vz": -now.body.climb_rate_m_s - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
+        },
+        "GLOBAL_POSITION_INT": lambda now: {
+            "time_boot_ms": now.boot_ms,
+            "lat": LATITUDE_E7,
+            "lon": LONGITUDE_E7,
+            "alt": round((HOME_AMSL_M + now.body.altitude_m) * 1000.0),
+            "relative_alt": round(now.body.altitude_m * 1000.0),
+            "vz": round(-now.body.climb_rate_m_s * 100.0),
+        },
+        "NAV_CONTROLLER_OUTPUT": lambda now: {"alt_error": now.controller.error_m},
+        "VFR_HUD": lambda now: {
+            "throttle": round(now.body.thrust * 100.0),
+            "alt": HOME_AMSL_M + now.body.altitude_m,
+            "climb": now.body.climb_rate_m_s,
+        },
+        "ATTITUDE_TARGET": lambda now: {
+            "time_boot_ms": now.boot_ms,
+            "q": [1.0, 0.0, 0.0, 0.0],  # level
+            "thrust": now.controller.demand,
+        },
         "POSITION_TARGET_LOCAL_NED": position_target,
-        "BATTERY_STATUS": battery_status,
-        "AUTOPILOT_VERSION": autopilot_version,
-        "FENCE_STATUS": fence_status,
-        "HOME_POSITION": home_position,
-        "EXTENDED_SYS_STATE": extended_state,
+        "BATTERY_STATUS": lambda now: {
+            "type": 1,
+            "temperature": 32767,
+            "voltages": [round(now.body.battery_v * 1000.0), *[65535] * 9],
+            "current_battery": -1,
+            "current_consumed": -1,
+            "energy_consumed": -1,
+            "battery_remaining": now.charge_percent,
+        },
+        "AUTOPILOT_VERSION": lambda now: {
+            "capabilities": 2 | (1 << 13),  # those that it has: MAVLink 2 and parameters as floats
+            "flight_sw_version": now.firmware.version,
+            "uid": now.uid,
+        },
+        "FENCE_STATUS": lambda now: {
+            "breach_status": int(now.is_breached),
+            "breach_count": now.breaches,
+            "breach_type": _ALTITUDE_BREACH if now.is_breached else 0,
+        },
+        "HOME_POSITION": lambda _now: {
+            "latitude": LATITUDE_E7,
+            "longitude": LONGITUDE_E7,
+            "altitude": round(HOME_AMSL_M * 1000.0),
+            "q": [1.0, 0.0, 0.0, 0.0],
+        },
+        "EXTENDED_SYS_STATE": lambda now: {"landed_state": _LANDED_STATES[now.controller.phase]},
     }
 )

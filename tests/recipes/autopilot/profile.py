@@ -7,7 +7,6 @@ from app.autopilots.autopilot import Autopilot, GainParameter
 from app.autopilots.commands import Action, Step, Target
 from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.measurements import Measurement
-from app.autopilots.simulated.body import SimulatedKind
 from app.core.experiments.takeoff import Takeoff
 
 MAKE: Final = 16
@@ -26,12 +25,6 @@ def _steps(action: Action, target: Target) -> tuple[Step, ...]:
         return (Step((above,), awaits="command 22", attempts=1),)
     steps = commands.copter_steps(action, target, LAND)
     return (Step((commands.set_mode(target, AUTO),), awaits="command 176"), *steps) if action is Action.ARM else steps
-
-
-def _simulated() -> tuple[SimulatedKind, ...]:
-    from app.autopilots.toy.simulated import KINDS  # type: ignore[import-not-found]
-
-    return KINDS  # type: ignore[no-any-return]
 
 
 TOY: Final = Autopilot(
@@ -58,5 +51,4 @@ TOY: Final = Autopilot(
     readers={**mavlink.READERS, "HEARTBEAT": _heartbeat},
     telemetry=commands.COPTER_TELEMETRY,
     steps=_steps,
-    simulated=_simulated,
 )

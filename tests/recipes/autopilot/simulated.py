@@ -74,7 +74,7 @@ class Toy(Copter):
         dialect=COMMON,
         autopilot=16,
         version=0x010000FF,
-        parameters=(real("TOY_P", 0.1), real("TOY_I", 0.02), real("TOY_D", 0.2)),
+        parameters=(real("TOY_P", 0.1), real("TOY_I", 0.02), real("TOY_D", 0.2), real("TOY_IDLE", 10.0)),
         periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
         streams=(),
         modes=(
@@ -94,6 +94,7 @@ class Toy(Copter):
         not_landed="In the air",
         link_lost="Link lost",
         fence_breached="Too high",
+        idle_limit="TOY_IDLE",
         ground_m=0.0,
     )
     controller: ToyController
@@ -121,9 +122,6 @@ class Toy(Copter):
 
     def fence(self) -> tuple[float, Reaction]:
         return 10.0, Reaction.LAND
-
-    def idle_limit_s(self) -> float:
-        return 10.0
 
 
 KINDS: Final = (copter_kind("toy", "Toy", Toy, {}),)

@@ -16,7 +16,7 @@ from app.autopilots.measurements import VehicleEvent
 from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.simulated import Px4
 from app.autopilots.simulated.body import OutgoingMessage
-from app.simdrone.fault_kinds import Fault, FaultTarget
+from app.simdrone.fault_kinds import Fault
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, VehicleError
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.mavlink.vehicle import STANDSTILL_S, MavlinkVehicle
@@ -91,10 +91,6 @@ class AltitudeAnew(Fault):
     """An estimator that puts its origin half a metre lower as it is armed."""
 
     name = "altitude-anew"
-    drone: FaultTarget
-
-    def begin(self, drone: FaultTarget) -> None:
-        self.drone = drone
 
     def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [self._raised(letter) for letter in letters]

@@ -15,7 +15,7 @@ from app.autopilots.measurements import Measurement, Throttle
 from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.simulated.body import OutgoingMessage
 from app.core.experiments.takeoff import Takeoff
-from app.simdrone.fault_kinds import Fault, FaultTarget
+from app.simdrone.fault_kinds import Fault
 from app.vehicles.base import FlightOptions, FlightRecord, Sample
 from tests.vehicles.flying import Watcher, never
 from tests.vehicles.mavlink.replaying import FLOWN, messages
@@ -138,10 +138,6 @@ class Hostile(Fault):
     """Changes the reports of throttle."""
 
     name: ClassVar[str]
-    drone: FaultTarget
-
-    def begin(self, drone: FaultTarget) -> None:
-        self.drone = drone
 
     def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [each for letter in letters for each in (self.changed(letter) if letter.kind == "VFR_HUD" else [letter])]
@@ -163,10 +159,7 @@ class ThrottleEnds(Hostile):
     """VFR_HUD is no longer sent once the drone is above 1 m."""
 
     name = "throttle-ends"
-
-    def begin(self, drone: FaultTarget) -> None:
-        super().begin(drone)
-        self.ended = False
+    ended = False
 
     def changed(self, letter: OutgoingMessage) -> list[OutgoingMessage]:
         self.ended = self.ended or self.drone.body.altitude_m > 1.0
@@ -177,10 +170,7 @@ class WildThrottle(Hostile):
     """Full and none in turns."""
 
     name = "wild-throttle"
-
-    def begin(self, drone: FaultTarget) -> None:
-        super().begin(drone)
-        self.count = 0
+    count = 0
 
     def changed(self, letter: OutgoingMessage) -> list[OutgoingMessage]:
         self.count += 1

@@ -101,7 +101,7 @@ class LoopLog:
     The positions have shape (n,), and `time_s` increases. The others are rows, shape (m,), m ≥ 1: `place` is the index
     of the position that a row was computed from, and increases. The set-points are those in force, NaN if not given;
     `known` tells that those of velocity and acceleration are. `hover` is the hover thrust in force, NaN where it is not
-    known. `takeoff` is the state of the takeoff; the limits are the mode's, m/s, at least 0.
+    known. All set-points count in rows that are `flying`; the limits are the mode's, m/s, at least 0.
     """
 
     parameters: Parameters
@@ -110,8 +110,7 @@ class LoopLog:
     vz_m_s: Samples
     z_derivative_m_s: Samples
     place: NDArray[np.int64]
-    takeoff: Samples
-    ground_contact: NDArray[np.bool_]
+    flying: NDArray[np.bool_]
     set_z_m: Samples
     set_vz_m_s: Samples
     set_az_m_s2: Samples
@@ -122,11 +121,6 @@ class LoopLog:
     out_vz_m_s: Samples
     out_az_m_s2: Samples
     out_thrust: Samples
-
-    @property
-    def flying(self) -> NDArray[np.bool_]:
-        """Rows in which all set-points count, shape (m,)."""
-        return np.asarray((self.takeoff == loop.FLIGHT) & ~self.ground_contact)
 
 
 def replica_of(log: LoopLog) -> dict[str, Samples]:
