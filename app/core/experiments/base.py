@@ -306,8 +306,13 @@ class ModelledExperiment(Experiment):
         return np.array([each.lower for each in parameters]), np.array([each.upper for each in parameters])
 
     @property
+    def prior_mean(self) -> Vector:
+        """Prior means of the parameters in a fit, shape (m,)."""
+        return np.array([parameter.prior_mean for parameter in self.model_parameters])
+
+    @property
     def prior_sd(self) -> Vector:
-        """Prior standard deviations of the parameters in a fit, shape (m,)."""
+        """Their standard deviations, shape (m,)."""
         return np.array([parameter.prior_sd for parameter in self.model_parameters])
 
     def least_model_error(self, base: Trajectory) -> float:  # noqa: ARG002 - not without a resolution of its own
