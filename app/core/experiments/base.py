@@ -141,11 +141,11 @@ class ModelParameter:
     name: str
     title: str
     unit: str
-    nominal: float
-    lower: float
     upper: float
     prior_sd: float
     known_within: float
+    nominal: float = 0.0
+    lower: float = 0.0
     expected: float | None = None
     flight_sd: float = 0.0
 

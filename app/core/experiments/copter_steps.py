@@ -65,7 +65,7 @@ def copter_parameters(hover: tuple[float, float], slope: tuple[float, float]) ->
 
 
 def _parameter(name: str, title: str, unit: str, mean: float, sd: float, lower: float, upper: float) -> ModelParameter:
-    return ModelParameter(name, title, unit, mean, lower, upper, prior_sd=sd, known_within=sd)
+    return ModelParameter(name, title, unit, upper, prior_sd=sd, known_within=sd, nominal=mean, lower=lower)
 
 
 def copter_of(model: Vector) -> Copter:

@@ -17,7 +17,8 @@ from app.core.experiments.base import (
     ParameterDistribution,
     SimplexSearch,
 )
-from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights, check_wrapping
+from app.core.experiments.integer_overflow import check_wrapping
+from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
 from app.core.models.vertical_batch import fly_batch
@@ -31,31 +32,17 @@ def _gain(name: str, title: str, upper: int, default: int) -> Gain:
     return Gain(name, title, "counts", lower=0, upper=upper, scale=upper / 10, default=default, integer=True)
 
 
-def _known(
-    name: str,
-    title: str,
-    unit: str,
-    upper: float,
-    prior_sd: float,
-    within: float,
-    *,
-    nominal: float = 0.0,
-    lower: float = 0.0,
-    expected: float | None = None,
-    flight_sd: float = 0.0,
-) -> ModelParameter:
-    return ModelParameter(name, title, unit, nominal, lower, upper, prior_sd, within, expected, flight_sd)
-
-
 MODEL_PARAMETERS: Final = (
-    _known("hover_throttle", "Hover throttle", "of full", 0.95, 0.09, 0.05, nominal=0.63, lower=0.3, flight_sd=0.002),
-    _known("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
-    _known("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
-    _known("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
-    _known("quadratic_share", "Quadratic share of thrust", "", 1.0, 0.5, 0.3),
-    _known("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
-    _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
-    _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
+    ModelParameter(
+        "hover_throttle", "Hover throttle", "of full", 0.95, 0.09, 0.05, nominal=0.63, lower=0.3, flight_sd=0.002
+    ),
+    ModelParameter("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
+    ModelParameter("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
+    ModelParameter("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
+    ModelParameter("quadratic_share", "Quadratic share of thrust", "", 1.0, 0.5, 0.3),
+    ModelParameter("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
+    ModelParameter("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
+    ModelParameter("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
 )
 """The nominal model has mass and thrust only: every other nominal value is zero. The expected values of the others are
 typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""

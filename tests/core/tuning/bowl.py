@@ -19,7 +19,7 @@ from app.core.experiments.base import (
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 
-OFFSET: Final = ModelParameter("offset", "Offset", "m", 0.0, -1.0, 1.0, prior_sd=0.1, known_within=0.5)
+OFFSET: Final = ModelParameter("offset", "Offset", "m", upper=1.0, prior_sd=0.1, known_within=0.5, lower=-1.0)
 
 
 class QuadraticExperiment(ModelledExperiment):
@@ -31,7 +31,7 @@ class QuadraticExperiment(ModelledExperiment):
     error_unit = "m"
     space = PolicySpace(
         (
-            Gain("a", "A", "1", lower=0, upper=100, scale=10, default=90, integer=False),
+            Gain("a", "A", "1", lower=0, upper=100, scale=10, default=90),
             Gain("b", "B", "counts", lower=0, upper=100, scale=5, default=90, integer=True),
         )
     )
