@@ -85,13 +85,9 @@ class ParameterDistribution:
     def sample(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
         """The mean, then `count` − 1 quasi-random models, shape (count, m); deterministic."""
         unit = halton(len(self.mean), count)[1:]
-        return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
+        return np.vstack((self.models(experiment, np.full((1, len(self.mean)), 0.5)), self.models(experiment, unit)))
 
-    def draw_random(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
-        """Random models from the same distribution, shape (count, m)."""
-        return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
-
-    def _models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
+    def models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
         """Models from uniformly distributed numbers in 0 … 1, shape (k, m)."""
         from scipy.special import ndtri
 
@@ -240,6 +236,8 @@ class Experiment(ABC):
     error_unit: str
     window_s: float
     """End of the scored time, s since the command. Errors over different windows are different quantities."""
+    grid_hz: float
+    """Samples of a model run in a second."""
     scored_from_s: float = 0.0
     """Beginning of the scored time, s since the command."""
     measure: str
@@ -260,9 +258,9 @@ class Experiment(ABC):
         return None
 
     @property
-    @abstractmethod
     def grid_s(self) -> Samples:
-        """Times of a model run from the command to the end of the window, shape (n,)."""
+        """Times of a model run from the command to the first instant at or past the end of the window, shape (n,)."""
+        return np.arange(int(np.ceil(self.window_s * self.grid_hz)) + 1) / self.grid_hz
 
     def set_point(self, time_s: Samples) -> Samples:
         """Set point of the scored output, same shape as `time_s`; zero before the command, and without set points."""

@@ -39,8 +39,6 @@ CLIMB_S: Final = 15.0
 """Time from the command to the first step: ArduCopter's motors are off for 2 s after arming, PX4's thrust rises for 3 s
 in a takeoff, and both then settle."""
 LARGEST_STEP_M: Final = 2.0
-GRID_HZ: Final = 50.0
-"""Rate of a model run's output."""
 
 COPTERS: Final = 5
 """Vehicles of a distribution that are checked, and for which gains are searched."""
@@ -89,6 +87,7 @@ class CopterSteps(StepsManoeuvre, ModelledExperiment):
     """The parameters of copters under this autopilot in general."""
 
     options = step_options(largest_step_m=LARGEST_STEP_M)
+    grid_hz = 50.0
     scored_from_s = CLIMB_S
     search = SimplexSearch(of_scale=0.5, evaluations=200)
     difference = 0.05
@@ -151,11 +150,6 @@ class CopterSteps(StepsManoeuvre, ModelledExperiment):
     def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
         """The same steps of another copter."""
         return replace(self, model_parameters=model_parameters)
-
-    @property
-    def grid_s(self) -> Samples:
-        """Every 20 ms from the command to the first instant at or past the end of the window, shape (n,)."""
-        return np.arange(int(np.ceil(self.window_s * GRID_HZ)) + 1) / GRID_HZ
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the model; before the first step, of its reference."""

@@ -136,7 +136,7 @@ class PitchTracking(ModelledExperiment):
 
     @property
     def grid_s(self) -> Samples:
-        """Every 0.02 s for a minute: shape (3001,)."""
+        """Every 0.02 s for a minute, shape (3001,); as multiples of the step, which differ in the last bit."""
         return np.arange(_SAMPLES, dtype=np.float64) * STEP_S
 
     def systems(self, model: Matrix | Vector) -> Matrix:

@@ -11,12 +11,12 @@ import numpy as np
 from app.core.control.vertical_guidance import RATE_HZ
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment, Matrix, ModelParameter, Scatter
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts, grid_of
+from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.metrics import mean_absolute_error, mean_absolute_errors, require_scorable
-from app.core.records.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Trajectory
 
 TARGET_M: Final = 3.0
 WINDOW_S: Final = 32.6
@@ -69,6 +69,7 @@ class TakeoffManoeuvre(Experiment):
     options = OPTIONS
     output = "altitude_m"
     error_unit = "m"
+    grid_hz = RATE_HZ
     measure = "a takeoff to 3 m"
 
     def errors(self, outputs: Matrix) -> Vector:
@@ -155,8 +156,3 @@ class CopterTakeoff(TakeoffManoeuvre):
         if window_s == self.window_s:
             return self
         return type(self)(self.name, self._autopilot, self.space.gains, window_s=window_s)
-
-    @property
-    def grid_s(self) -> Samples:
-        """The same as the paper's takeoff."""
-        return grid_of(self.window_s)

@@ -23,7 +23,7 @@ from app.core.models.set_points import SetPoints
 from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
-from app.core.records.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Trajectory
 
 _STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
 
@@ -56,6 +56,7 @@ class VerticalLoop(ModelledExperiment):
 
     output = "altitude_m"
     error_unit = "m"
+    grid_hz = RATE_HZ
     space = PolicySpace(
         (
             _gain("kp", "Proportional gain", 4000, 283),
@@ -76,11 +77,6 @@ class VerticalLoop(ModelledExperiment):
         self.set_points = set_points
         self.window_s = window_s
         self._samples: Final = len(self.grid_s)
-
-    @property
-    def grid_s(self) -> Samples:
-        """As `grid_of` the window."""
-        return grid_of(self.window_s)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
@@ -129,11 +125,6 @@ class VerticalLoop(ModelledExperiment):
 
     def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
         return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
-
-
-def grid_of(window_s: float) -> Samples:
-    """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
-    return np.arange(int(np.ceil(window_s * RATE_HZ)) + 1) / RATE_HZ
 
 
 def counts(gains: Vector | Matrix) -> Counts:

@@ -15,7 +15,7 @@ by Gauss–Newton with a limited step; the noise σ of each state is re-estimate
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -272,12 +272,8 @@ def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vec
 
     Each search is restarted from its end until it no longer improves.
     """
-    reach = PolicySpace(
-        tuple(
-            replace(gain, lower=float(lower), upper=float(upper))
-            for gain, lower, upper in zip(space.gains, low, high, strict=True)
-        )
-    )
+    bounds = zip(low.tolist(), high.tolist(), strict=True)
+    reach = space.narrowed(dict(zip(space.names, bounds, strict=True)))
     spread = low + (high - low) * halton(len(low), _STARTS)
     starts = np.vstack((base, reach.nearest(space.default), spread))
     errors = uncorrected_model(aircraft).errors(starts)
