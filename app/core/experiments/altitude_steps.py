@@ -9,10 +9,10 @@ import numpy as np
 
 from app.core.analysis.loop import MarginTexts
 from app.core.control.vertical_guidance import FULL_THRUST, POSITION_BITS, RATE_HZ, STEP_S
-from app.core.experiments.base import Check, Envelope, Matrix, ModelParameter, ParameterDistribution, Scatter
+from app.core.experiments.base import Check, Envelope, Matrix, ParameterDistribution, Scatter
 from app.core.experiments.copter_steps import COPTERS, check_margin
 from app.core.experiments.step_sequence import REFERENCE, StepSequence, StepsManoeuvre, step_options
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
+from app.core.experiments.vertical_loop import VerticalLoop, counts
 from app.core.models.copter import filtered, motor_filter
 from app.core.models.vertical import (
     ALTITUDE,
@@ -94,20 +94,14 @@ class AltitudeSteps(StepsManoeuvre, VerticalLoop):
     yet."""
     held_s = 20.0
 
-    def __init__(
-        self, model_parameters: tuple[ModelParameter, ...] = MODEL_PARAMETERS, *, sequence: StepSequence = _SEQUENCE
-    ) -> None:
-        super().__init__(model_parameters, sequence.set_points, sequence.ends_s)
+    def __init__(self, *, sequence: StepSequence = _SEQUENCE) -> None:
+        super().__init__(sequence.set_points, sequence.ends_s)
         self.sequence = sequence
         self.measure = str(sequence)
 
     def with_sequence(self, sequence: StepSequence) -> Self:
-        """Another sequence on the same model."""
-        return type(self)(self.model_parameters, sequence=sequence)
-
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same sequence on another model."""
-        return type(self)(model_parameters, sequence=self.sequence)
+        """Another sequence on the nominal model."""
+        return type(self)(sequence=sequence)
 
     def least_model_error(self, base: Trajectory) -> float:
         """The loop rounds the altitude to 1/256 m, and the time at which a step took effect is known to a row of the

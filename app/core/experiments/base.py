@@ -4,6 +4,7 @@ experiment needs one file and one line in the registry.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import count as numbers_from
 from itertools import islice
@@ -318,20 +319,15 @@ class ModelledExperiment(Experiment):
         relative error, for flights recorded as `base` was."""
         return 0.0
 
-    @abstractmethod
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same experiment on another model."""
-
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd`, shape (m,), are in
         place of the data sheet's values."""
-        fitted = zip(self.model_parameters, mean.tolist(), sd.tolist(), strict=True)
-        return self.with_parameters(
-            tuple(
-                replace(parameter, nominal=value, prior_sd=spread, known_within=2.0 * spread, expected=None)
-                for parameter, value, spread in fitted
-            )
+        informed, fitted = copy(self), zip(self.model_parameters, mean.tolist(), sd.tolist(), strict=True)
+        informed.model_parameters = tuple(
+            replace(parameter, nominal=value, prior_sd=spread, known_within=2.0 * spread, expected=None)
+            for parameter, value, spread in fitted
         )
+        return informed
 
     def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
         """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.

@@ -147,10 +147,6 @@ class CopterSteps(StepsManoeuvre, ModelledExperiment):
         changed.loop(self.space.default)
         return changed
 
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same steps of another copter."""
-        return replace(self, model_parameters=model_parameters)
-
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the model; before the first step, of its reference."""
         steps_s, flown = self._fly(gains, model)

@@ -116,23 +116,17 @@ class PitchTracking(ModelledExperiment):
         Option(name="model_seed", title="Seed that selects the inaccurate model", default=0, lower=0, upper=2**32 - 1),
     )
 
-    def __init__(
-        self, options: Mapping[str, OptionValue] | None = None, parameters: tuple[ModelParameter, ...] | None = None
-    ) -> None:
+    def __init__(self, options: Mapping[str, OptionValue] | None = None) -> None:
         """`options` must be free of problems."""
-        self._options: Final = with_defaults(options or {}, self.options)
-        perturbation = float(self._options["perturbation"])
-        self._system: Final = perturbed(perturbation, int(self._options["model_seed"]))
-        self.model_parameters = _parameters(perturbation) if parameters is None else parameters
+        chosen = with_defaults(options or {}, self.options)
+        perturbation = float(chosen["perturbation"])
+        self._system: Final = perturbed(perturbation, int(chosen["model_seed"]))
+        self.model_parameters = _parameters(perturbation)
         self._kept: tuple[bytes, Matrix] | None = None
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The experiment with another inaccurate model; settings missing in `options` have their defaults."""
         return type(self)(options)
-
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same experiment on another aircraft."""
-        return type(self)(self._options, model_parameters)
 
     @property
     def grid_s(self) -> Samples:

@@ -10,8 +10,8 @@ import numpy as np
 
 from app.core.control.vertical_guidance import RATE_HZ
 from app.core.definition import Option, OptionValue, with_defaults
-from app.core.experiments.base import Experiment, Matrix, ModelParameter, Scatter
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
+from app.core.experiments.base import Experiment, Matrix, Scatter
+from app.core.experiments.vertical_loop import VerticalLoop, counts
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
@@ -96,21 +96,15 @@ class Takeoff(TakeoffManoeuvre, VerticalLoop):
     """Altitudes between which a sketch should stay, m; they keep a margin from what is unsafe."""
     simulated_as = "takeoff"
 
-    def __init__(
-        self, model_parameters: tuple[ModelParameter, ...] = MODEL_PARAMETERS, *, window_s: float = WINDOW_S
-    ) -> None:
+    def __init__(self, *, window_s: float = WINDOW_S) -> None:
         """`window_s` must be free of problems."""
-        super().__init__(model_parameters, SET_POINTS, window_s)
+        super().__init__(SET_POINTS, window_s)
         self.scatter = _scatter(window_s, degrees_of_freedom=4.0)
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The takeoff with another window; itself if that is its own."""
         window_s = float(with_defaults(options, OPTIONS)["window_s"])
-        return self if window_s == self.window_s else type(self)(self.model_parameters, window_s=window_s)
-
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The takeoff on another model."""
-        return type(self)(model_parameters, window_s=self.window_s)
+        return self if window_s == self.window_s else type(self)(window_s=window_s)
 
     def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
         """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:

@@ -72,8 +72,9 @@ class VerticalLoop(ModelledExperiment):
     """Time that the gate simulates beyond the window, at the last set point."""
     set_points: SetPoints
 
-    def __init__(self, model_parameters: tuple[ModelParameter, ...], set_points: SetPoints, window_s: float) -> None:
-        self.model_parameters = model_parameters
+    model_parameters = MODEL_PARAMETERS
+
+    def __init__(self, set_points: SetPoints, window_s: float) -> None:
         self.set_points = set_points
         self.window_s = window_s
         self._samples: Final = len(self.grid_s)
