@@ -109,17 +109,8 @@ def _is_repeat(flights: Sequence[Flight], place: int) -> bool:
     return any(earlier.error is not None and earlier.gains == flights[place].gains for earlier in flights[:place])
 
 
-def landing_battery_v(record: Trajectory) -> float | None:
-    """Battery voltage at the end of a flight, V; None if not recorded."""
-    return _battery_v(record, -1)
-
-
-def starting_battery_v(record: Trajectory) -> float | None:
-    """Battery voltage at the start of a flight, V; None if not recorded."""
-    return _battery_v(record, 0)
-
-
-def _battery_v(record: Trajectory, sample: int) -> float | None:
+def battery_v(record: Trajectory, sample: int) -> float | None:
+    """Battery voltage in the first sample, 0, or the last, -1, of a flight, V; None if not recorded."""
     recorded = record.channels.get("battery_v")
     return float(recorded[sample]) if recorded is not None and len(recorded) else None
 

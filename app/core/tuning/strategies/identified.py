@@ -55,7 +55,6 @@ _SMALLEST: Final = 1e-12
 _MIN_RECORD: Final = WINDOW_STEPS + 1
 
 _STARTS: Final = 256
-_SEARCHES: Final = 1
 _RESTARTS: Final = 8
 _SEARCH_TOLERANCE: Final = 1e-4
 _MODELS: Final = 48
@@ -277,8 +276,7 @@ def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vec
     spread = low + (high - low) * halton(len(low), _STARTS)
     starts = np.vstack((base, reach.nearest(space.default), spread))
     errors = uncorrected_model(aircraft).errors(starts)
-    likely = starts[np.argsort(errors, kind="stable")[:_SEARCHES]]
-    ends = [_restarted(aircraft, reach, start) for start in (*likely, base)]
+    ends = [_restarted(aircraft, reach, start) for start in (starts[np.argmin(errors)], base)]
     return min(ends, key=lambda end: end.error)
 
 
