@@ -221,26 +221,16 @@ class CopterSteps(StepsManoeuvre, ModelledExperiment):
 def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) -> tuple[Check, Check]:
     """Highest and lowest altitude of simulated flights, shape (k, n): below the ceiling, and above half of the lowest
     set point."""
-    highest_m, lowest_m = float(altitudes.max()), float(altitudes.min())
-    floor_m = 0.5 * min(set_points.altitudes_m)
-    rises = "rises to" if highest_m <= ceiling_m else "would rise to"
-    falls = "falls to" if lowest_m >= floor_m else "would fall to"
+    highest_m, lowest_m, floor_m = float(altitudes.max()), float(altitudes.min()), 0.5 * min(set_points.altitudes_m)
+
+    def check(name: str, end: str, verb: str, worst: float, limit: float, passed: bool) -> Check:
+        does = f"{verb}s" if passed else f"would {verb}"
+        flights = f"The {end} of {len(altitudes)} simulated flights {does} to {number(worst, 2)} m"
+        return Check(name, passed, f"{flights}; {limit:g} m is allowed.", worst=worst, limit=limit)
+
     return (
-        Check(
-            "altitude",
-            highest_m <= ceiling_m,
-            f"The highest of {len(altitudes)} simulated flights {rises} {highest_m:.2f} m; {ceiling_m:g} m is allowed.",
-            worst=highest_m,
-            limit=ceiling_m,
-        ),
-        Check(
-            "lowest altitude",
-            lowest_m >= floor_m,
-            f"The lowest of {len(altitudes)} simulated flights {falls} {number(lowest_m, 2)} m; "
-            f"{floor_m:g} m is allowed.",
-            worst=lowest_m,
-            limit=floor_m,
-        ),
+        check("altitude", "highest", "rise", highest_m, ceiling_m, highest_m <= ceiling_m),
+        check("lowest altitude", "lowest", "fall", lowest_m, floor_m, lowest_m >= floor_m),
     )
 
 
