@@ -108,16 +108,13 @@ def normal_distribution(mean: Vector, covariance: "Matrix", origin: str) -> Para
     return ParameterDistribution(mean=tuple(mean.tolist()), covariance=rows, origin=origin)
 
 
-NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
-
-
 def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
     """Distribution given by the data sheet: each parameter within `known_within` of its nominal value.
 
     Empty without a model.
     """
     if not isinstance(experiment, ModelledExperiment):
-        return NO_PARAMETERS
+        return ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
     sd: Vector = np.array([parameter.known_within for parameter in experiment.model_parameters]) / WIDEST_SD
     return normal_distribution(experiment.nominal_model, np.diag(sd**2), origin="the data sheet")
 

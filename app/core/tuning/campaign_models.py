@@ -132,21 +132,14 @@ def find_robust_optimum(experiment: Takeoff, box: Box, models: Matrix, known: Ma
 
     steps = (box.high - box.low) / 10.0
     ends = [
-        box.nearest(minimise_in_box(fine, start, steps, box.low, box.high, evaluations=evaluations, tolerance=1.0))
+        box.nearest(minimise_in_box(fine, start, steps, box, evaluations=evaluations, tolerance=1.0))
         for start, evaluations in zip(starts, _EVALUATIONS, strict=True)
     ]
     return ends[int(np.argmin([fine(end) for end in ends]))]
 
 
 def minimise_in_box(
-    error: Callable[[Vector], float],
-    start: Vector,
-    steps: Vector,
-    low: Vector,
-    high: Vector,
-    *,
-    evaluations: int,
-    tolerance: float,
+    error: Callable[[Vector], float], start: Vector, steps: Vector, box: Box, *, evaluations: int, tolerance: float
 ) -> Vector:
     """Minimise `error` within the box and return the final point, shape (n,).
 
@@ -155,12 +148,12 @@ def minimise_in_box(
     """
     from scipy.optimize import minimize
 
-    inward = np.where(start > (low + high) / 2.0, -steps, steps)
+    inward = np.where(start > (box.low + box.high) / 2.0, -steps, steps)
     found = minimize(
         error,
         start,
         method="Nelder-Mead",
-        bounds=list(zip(low, high, strict=True)),
+        bounds=list(zip(box.low, box.high, strict=True)),
         options={
             "initial_simplex": np.vstack((start, start + np.diag(inward))),
             "maxfev": evaluations,

@@ -10,7 +10,6 @@ campaign's bounds, flown by overruling a refusal, would be refused again and are
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Final, Literal
 
 from app.core.definition import Flight, StopRule, aborted_by_gains
@@ -192,7 +191,7 @@ def _ended(
     return None
 
 
-_NONE_BETTER: Final = MappingProxyType({0: "No other gains were flown.", 1: "The other gain set flown is not better."})
+_NONE_BETTER: Final = {0: "No other gains were flown.", 1: "The other gain set flown is not better."}
 
 _NO_STEP: Final = "No further step is flown:"
 
