@@ -42,7 +42,7 @@ class Gain:
     upper: float
     scale: float
     default: float
-    integer: bool = False
+    integer: bool
 
     @property
     def span(self) -> float:

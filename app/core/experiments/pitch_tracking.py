@@ -62,6 +62,10 @@ _ROWS: Final = ("h", "Θ", "V", "α", "q")
 _COLUMNS: Final = (*_ROWS, "F_T", "δ")
 
 
+def _gain(name: str, title: str, unit: str, lower: float, upper: float, scale: float, default: float) -> Gain:
+    return Gain(name, title, unit, lower=lower, upper=upper, scale=scale, default=default, integer=False)
+
+
 def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
     return tuple(
         ModelParameter(
@@ -97,12 +101,12 @@ class PitchTracking(ModelledExperiment):
     difference = 0.001
     space = PolicySpace(
         (
-            Gain("theta_1", "Thrust per speed", "lb·s/ft", -200.0, -20.0, 50.0, -50.0),
-            Gain("theta_2", "Thrust offset", "lb", -50.0, 50.0, 100.0, 0.0),
-            Gain("theta_3", "Elevator per pitch error", "deg/rad", -57.3, 0.0, 20.0, -15.0),
-            Gain("theta_4", "Elevator per angle of attack", "deg/rad", -57.3, 57.3, 20.0, 0.0),
-            Gain("theta_5", "Elevator per pitch rate", "deg·s/rad", -57.3, 57.3, 10.0, 10.0),
-            Gain("theta_6", "Elevator offset", "deg", -5.0, 5.0, 1.0, 0.0),
+            _gain("theta_1", "Thrust per speed", "lb·s/ft", -200.0, -20.0, 50.0, -50.0),
+            _gain("theta_2", "Thrust offset", "lb", -50.0, 50.0, 100.0, 0.0),
+            _gain("theta_3", "Elevator per pitch error", "deg/rad", -57.3, 0.0, 20.0, -15.0),
+            _gain("theta_4", "Elevator per angle of attack", "deg/rad", -57.3, 57.3, 20.0, 0.0),
+            _gain("theta_5", "Elevator per pitch rate", "deg·s/rad", -57.3, 57.3, 10.0, 10.0),
+            _gain("theta_6", "Elevator offset", "deg", -5.0, 5.0, 1.0, 0.0),
         )
     )
     options = (

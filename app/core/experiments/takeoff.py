@@ -122,7 +122,7 @@ class Takeoff(TakeoffManoeuvre, VerticalLoop):
 
 def copter_gain(name: str, title: str, unit: str, lower: float, upper: float, default: float) -> Gain:
     """A gain of another autopilot."""
-    return Gain(name, title, unit, lower=lower, upper=upper, scale=upper / 10, default=default)
+    return Gain(name, title, unit, lower=lower, upper=upper, scale=upper / 10, default=default, integer=False)
 
 
 class CopterTakeoff(TakeoffManoeuvre):

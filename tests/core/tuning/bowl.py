@@ -31,7 +31,7 @@ class QuadraticExperiment(ModelledExperiment):
     error_unit = "m"
     space = PolicySpace(
         (
-            Gain("a", "A", "1", lower=0, upper=100, scale=10, default=90),
+            Gain("a", "A", "1", lower=0, upper=100, scale=10, default=90, integer=False),
             Gain("b", "B", "counts", lower=0, upper=100, scale=5, default=90, integer=True),
         )
     )
