@@ -26,7 +26,7 @@ from app.core.definition import Definition, Flight
 from app.core.errors import TrajectoryError
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import halton
-from app.core.policy import Gains, Vector
+from app.core.policy import Box, Gains, Vector
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.campaign_models import minimise_in_box
 from app.core.tuning.proposals import next_proposal
@@ -122,7 +122,7 @@ def search(vehicle: SampledVehicle, known: Gains) -> tuple[float, Gains]:
     start = points[int(np.argmin([error(point) for point in points]))]
     steps = (SPACE.upper - SPACE.lower) / 10.0
     end = minimise_in_box(
-        error, start, steps, SPACE.lower, SPACE.upper, evaluations=EVALUATIONS[vehicle.kind], tolerance=1.0
+        error, start, steps, Box(SPACE.lower, SPACE.upper), evaluations=EVALUATIONS[vehicle.kind], tolerance=1.0
     )
     best = min((start, end), key=error)
     return error(best), SPACE.mapping(SPACE.nearest(best))

@@ -72,7 +72,7 @@ def after_a_flight() -> ParameterDistribution:
 
 def harm(gains: Vector, spread: ParameterDistribution, takeoffs: int, seed: int) -> str:
     """Return what the first harmful takeoff does; empty if none is harmful."""
-    models = spread.draw_random(TAKEOFF, takeoffs, seed)
+    models = spread.models(TAKEOFF, np.random.default_rng(seed).random((takeoffs, len(spread.mean))))
     for first in range(0, takeoffs, BATCH):
         curves = TAKEOFF.outputs(np.tile(gains, (len(models[first : first + BATCH]), 1)), models[first : first + BATCH])
         for curve in curves:

@@ -12,15 +12,12 @@ class Clock(Protocol):
 
     def now_s(self) -> float:
         """Monotonic seconds from an arbitrary origin."""
-        ...
 
     def wait_s(self, seconds: float) -> None:
         """Return after `seconds`; at once when they are not above 0."""
-        ...
 
     def wall_s(self, seconds: float) -> float:
         """Convert `seconds` to wall-clock seconds, for waiting on sockets and locks."""
-        ...
 
 
 class ScaledClock:

@@ -23,7 +23,7 @@ from app.campaigns.history import set_flight_state, set_trial_state, trial_row
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import FlightMode, FlightState, TrialState, VehicleState
-from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
+from app.core.tuning.stop_rules import battery_v
 from app.db.base import added, utc_now
 from app.db.models import FlightRow
 from app.fleet import service as fleet
@@ -362,8 +362,8 @@ def _record_doubts(flight: FlightRow, outcome: FlightOutcome) -> None:
 def _capture(session: Session, flight: FlightRow, record: FlightRecord) -> None:
     capture(session, flight.trial, record.trajectory, ending=record.ending, end=record.end)
     flight.trial.settings = dict(record.settings)
-    flight.battery_v_before = starting_battery_v(record.trajectory)
-    flight.battery_v_after = landing_battery_v(record.trajectory)
+    flight.battery_v_before = battery_v(record.trajectory, 0)
+    flight.battery_v_after = battery_v(record.trajectory, -1)
 
 
 def _end(flight: FlightRow, state: FlightState, end: FlightEnd) -> None:

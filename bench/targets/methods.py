@@ -22,7 +22,7 @@ from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.corrected_model import start_gains
-from app.core.tuning.definition_checks import check_definition
+from app.core.tuning.definition_checks import problems_of
 from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.proposals import next_proposal
@@ -243,7 +243,7 @@ def _definition(strategy: str, options: Mapping[str, OptionValue], tuning: Tunin
         stop=StopRule(kind="budget", max_flights=tuning.budget),
         seed=tuning.campaign_seed,
     )
-    check_definition(definition, EXPERIMENTS)
+    assert problems_of(definition, EXPERIMENTS) == ()
     return definition
 
 

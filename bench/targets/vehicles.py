@@ -12,7 +12,7 @@ from app.core.errors import InputError, Problem
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
 from app.core.models.vertical import GRAVITY_M_S2
-from app.core.policy import Gains, Vector
+from app.core.policy import Box, Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.tuning.campaign_models import minimise_in_box
 from app.vehicles.base import OptionValue
@@ -211,7 +211,7 @@ def _descend(error: Callable[[Vector], float], start: Vector, step: float, evalu
     """Nelder–Mead with a first step of `step` times each gain's scale."""
     space = _TAKEOFF.space
     return minimise_in_box(
-        error, start, step * space.scale, space.lower, space.upper, evaluations=evaluations, tolerance=0.5
+        error, start, step * space.scale, Box(space.lower, space.upper), evaluations=evaluations, tolerance=0.5
     )
 
 

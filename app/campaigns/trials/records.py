@@ -41,7 +41,7 @@ from app.core.formatting import EXACT_DIGITS, count, format_gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Trajectory, select_samples
-from app.core.tuning.stop_rules import landing_battery_v
+from app.core.tuning.stop_rules import battery_v
 from app.db import trajectories
 from app.db.base import utc_now
 from app.db.models import TrialRow
@@ -124,7 +124,7 @@ def capture(
         row.settling_time_s = row.steady_state_error_m = None
         row.overshoot_m = row.overshoot_m or None
     row.curve = judged.curve
-    row.landing_battery_v = landing_battery_v(recorded)
+    row.landing_battery_v = battery_v(recorded, -1)
     row.ending, row.end = ending, end
     set_trial_state(row, TrialState.CAPTURED, reason=reason)
     if ending == "aborted":

@@ -2,7 +2,6 @@
 hover, on the model of `app.core.models.vertical`."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -10,11 +9,10 @@ import numpy as np
 
 from app.core.analysis.loop import MarginTexts
 from app.core.control.vertical_guidance import FULL_THRUST, POSITION_BITS, RATE_HZ, STEP_S
-from app.core.definition import OptionValue
-from app.core.experiments.base import Check, Envelope, Matrix, ModelParameter, ParameterDistribution, Scatter
+from app.core.experiments.base import Check, Envelope, Matrix, ParameterDistribution, Scatter
 from app.core.experiments.copter_steps import COPTERS, check_margin
-from app.core.experiments.step_sequence import REFERENCE, StepSequence, step_options
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
+from app.core.experiments.step_sequence import REFERENCE, StepSequence, StepsManoeuvre, step_options
+from app.core.experiments.vertical_loop import VerticalLoop, counts
 from app.core.models.copter import filtered, motor_filter
 from app.core.models.vertical import (
     ALTITUDE,
@@ -84,37 +82,26 @@ _SLOW_S: Final = 1.0 / (2.0 * math.pi * 2.0)
 _SEQUENCE: Final = StepSequence(climb_s=CLIMB_S)
 
 
-class AltitudeSteps(VerticalLoop):
-    """Steps of the altitude set point, scored by the distance from the autopilot's own reference.
-
-    That depends on the set points alone, and is at rest before the first step.
-    """
+class AltitudeSteps(StepsManoeuvre, VerticalLoop):
+    """Altitude steps whose reference depends on the set points alone, and is at rest before the first step."""
 
     name = "altitude-steps"
-    title = curves_title = "Altitude steps"
+    title = "Altitude steps"
     options = step_options(largest_step_m=1.0)
     scored_from_s = CLIMB_S
-    target_channel = REFERENCE
     scatter = Scatter(_SCATTER_M, degrees_of_freedom=1.0, measured=False)
     """Between that of the twin with the default gains, 19 mm, and with tuned ones, 0.5 mm: no real vehicle has flown it
     yet."""
     held_s = 20.0
 
-    def __init__(
-        self, model_parameters: tuple[ModelParameter, ...] = MODEL_PARAMETERS, *, sequence: StepSequence = _SEQUENCE
-    ) -> None:
-        super().__init__(model_parameters, sequence.set_points, sequence.ends_s)
-        self.sequence: Final = sequence
+    def __init__(self, *, sequence: StepSequence = _SEQUENCE) -> None:
+        super().__init__(sequence.set_points, sequence.ends_s)
+        self.sequence = sequence
         self.measure = str(sequence)
 
-    def configured(self, options: Mapping[str, OptionValue]) -> Self:
-        """The experiment with another sequence; itself if that is its own."""
-        sequence = self.sequence.chosen(options, self.options)
-        return self if sequence == self.sequence else type(self)(self.model_parameters, sequence=sequence)
-
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same sequence on another model."""
-        return type(self)(model_parameters, sequence=self.sequence)
+    def with_sequence(self, sequence: StepSequence) -> Self:
+        """Another sequence on the nominal model."""
+        return type(self)(sequence=sequence)
 
     def least_model_error(self, base: Trajectory) -> float:
         """The loop rounds the altitude to 1/256 m, and the time at which a step took effect is known to a row of the
@@ -146,7 +133,7 @@ class AltitudeSteps(VerticalLoop):
         outputs = self.outputs(np.tile(gains, (len(models), 1)), models) + disturbed[ALTITUDE] - still[ALTITUDE]
         fast = disturbed[_THRUST] - filtered(disturbed[_THRUST], motor_filter(_SLOW_S, STEP_S))
         scored = self.grid_s >= self.scored_from_s
-        return float(np.abs(outputs - self.reference)[:, scored].mean()), float(fast[scored].std())
+        return float(np.abs(outputs - self.followed_m)[:, scored].mean()), float(fast[scored].std())
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """As of all flights under this loop, and the margin from ringing."""
@@ -155,16 +142,12 @@ class AltitudeSteps(VerticalLoop):
             check_margin(LinearGuidance(gains), list(spread.sample(self, COPTERS))),
         )
 
-    def errors(self, outputs: Matrix) -> Vector:
-        """Mean absolute distance from the loop's reference, m, over the windows of the steps: (k, n) → (k,)."""
-        return self.sequence.errors(self.grid_s, outputs, self.reference)
-
-    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same for a recorded flight, against its recorded reference; raises TrajectoryError if it does not
-        count."""
-        return self.sequence.error(trajectory, accept_gaps=accept_gaps)
+    @property
+    def followed_m(self) -> Samples:
+        """The loop's reference in a model run."""
+        return reference_altitude(self.set_points, self._samples)
 
     @property
     def reference(self) -> Samples:
-        """The loop's reference in a model run."""
-        return reference_altitude(self.set_points, self._samples)
+        """The same: a flight may be late in following it."""
+        return self.followed_m

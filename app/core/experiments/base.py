@@ -4,6 +4,7 @@ experiment needs one file and one line in the registry.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import count as numbers_from
 from itertools import islice
@@ -85,13 +86,9 @@ class ParameterDistribution:
     def sample(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
         """The mean, then `count` − 1 quasi-random models, shape (count, m); deterministic."""
         unit = halton(len(self.mean), count)[1:]
-        return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
+        return np.vstack((self.models(experiment, np.full((1, len(self.mean)), 0.5)), self.models(experiment, unit)))
 
-    def draw_random(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
-        """Random models from the same distribution, shape (count, m)."""
-        return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
-
-    def _models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
+    def models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
         """Models from uniformly distributed numbers in 0 … 1, shape (k, m)."""
         from scipy.special import ndtri
 
@@ -111,16 +108,13 @@ def normal_distribution(mean: Vector, covariance: "Matrix", origin: str) -> Para
     return ParameterDistribution(mean=tuple(mean.tolist()), covariance=rows, origin=origin)
 
 
-NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
-
-
 def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
     """Distribution given by the data sheet: each parameter within `known_within` of its nominal value.
 
     Empty without a model.
     """
     if not isinstance(experiment, ModelledExperiment):
-        return NO_PARAMETERS
+        return ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
     sd: Vector = np.array([parameter.known_within for parameter in experiment.model_parameters]) / WIDEST_SD
     return normal_distribution(experiment.nominal_model, np.diag(sd**2), origin="the data sheet")
 
@@ -141,11 +135,11 @@ class ModelParameter:
     name: str
     title: str
     unit: str
-    nominal: float
-    lower: float
     upper: float
     prior_sd: float
     known_within: float
+    nominal: float = 0.0
+    lower: float = 0.0
     expected: float | None = None
     flight_sd: float = 0.0
 
@@ -240,6 +234,8 @@ class Experiment(ABC):
     error_unit: str
     window_s: float
     """End of the scored time, s since the command. Errors over different windows are different quantities."""
+    grid_hz: float
+    """Samples of a model run in a second."""
     scored_from_s: float = 0.0
     """Beginning of the scored time, s since the command."""
     measure: str
@@ -260,9 +256,9 @@ class Experiment(ABC):
         return None
 
     @property
-    @abstractmethod
     def grid_s(self) -> Samples:
-        """Times of a model run from the command to the end of the window, shape (n,)."""
+        """Times of a model run from the command to the first instant at or past the end of the window, shape (n,)."""
+        return np.arange(int(np.ceil(self.window_s * self.grid_hz)) + 1) / self.grid_hz
 
     def set_point(self, time_s: Samples) -> Samples:
         """Set point of the scored output, same shape as `time_s`; zero before the command, and without set points."""
@@ -306,8 +302,13 @@ class ModelledExperiment(Experiment):
         return np.array([each.lower for each in parameters]), np.array([each.upper for each in parameters])
 
     @property
+    def prior_mean(self) -> Vector:
+        """Prior means of the parameters in a fit, shape (m,)."""
+        return np.array([parameter.prior_mean for parameter in self.model_parameters])
+
+    @property
     def prior_sd(self) -> Vector:
-        """Prior standard deviations of the parameters in a fit, shape (m,)."""
+        """Their standard deviations, shape (m,)."""
         return np.array([parameter.prior_sd for parameter in self.model_parameters])
 
     def least_model_error(self, base: Trajectory) -> float:  # noqa: ARG002 - not without a resolution of its own
@@ -315,20 +316,15 @@ class ModelledExperiment(Experiment):
         relative error, for flights recorded as `base` was."""
         return 0.0
 
-    @abstractmethod
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same experiment on another model."""
-
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd`, shape (m,), are in
         place of the data sheet's values."""
-        fitted = zip(self.model_parameters, mean.tolist(), sd.tolist(), strict=True)
-        return self.with_parameters(
-            tuple(
-                replace(parameter, nominal=value, prior_sd=spread, known_within=2.0 * spread, expected=None)
-                for parameter, value, spread in fitted
-            )
+        informed, fitted = copy(self), zip(self.model_parameters, mean.tolist(), sd.tolist(), strict=True)
+        informed.model_parameters = tuple(
+            replace(parameter, nominal=value, prior_sd=spread, known_within=2.0 * spread, expected=None)
+            for parameter, value, spread in fitted
         )
+        return informed
 
     def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
         """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.

@@ -9,6 +9,7 @@ experiment's space, filters and limits are the autopilot's parameters (`under`),
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final, Self, TypeVar
 
 import numpy as np
@@ -17,7 +18,6 @@ from app.core.analysis.hover import HoverAdvice, advise_hover, found_hover
 from app.core.analysis.loop import AltitudeLoop, LinearLoop, LoggedFlight, Run
 from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.analysis.recorded_flight import FlownSteps
-from app.core.definition import OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import (
     Check,
@@ -28,7 +28,7 @@ from app.core.experiments.base import (
     ParameterDistribution,
     SimplexSearch,
 )
-from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, step_options
+from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, StepsManoeuvre, step_options
 from app.core.formatting import number
 from app.core.models.copter import DISTURBANCES, FLOWN, Copter
 from app.core.models.set_points import SetPoints
@@ -39,8 +39,6 @@ CLIMB_S: Final = 15.0
 """Time from the command to the first step: ArduCopter's motors are off for 2 s after arming, PX4's thrust rises for 3 s
 in a takeoff, and both then settle."""
 LARGEST_STEP_M: Final = 2.0
-GRID_HZ: Final = 50.0
-"""Rate of a model run's output."""
 
 COPTERS: Final = 5
 """Vehicles of a distribution that are checked, and for which gains are searched."""
@@ -65,7 +63,7 @@ def copter_parameters(hover: tuple[float, float], slope: tuple[float, float]) ->
 
 
 def _parameter(name: str, title: str, unit: str, mean: float, sd: float, lower: float, upper: float) -> ModelParameter:
-    return ModelParameter(name, title, unit, mean, lower, upper, prior_sd=sd, known_within=sd)
+    return ModelParameter(name, title, unit, upper, prior_sd=sd, known_within=sd, nominal=mean, lower=lower)
 
 
 def copter_of(model: Vector) -> Copter:
@@ -79,40 +77,32 @@ def vector_of(copter: Copter) -> Vector:
     return np.array([copter.hover_throttle, copter.thrust_slope, copter.motor_lag_s, copter.drag_1_s])
 
 
-class CopterSteps(ModelledExperiment):
-    """Steps of the altitude set point under an autopilot, with the model of a copter."""
+@dataclass(eq=False, kw_only=True)
+class CopterSteps(StepsManoeuvre, ModelledExperiment):
+    """Altitude steps under an autopilot, with the model of a copter, by default one as in its `data_sheet`. `unfit` are
+    the autopilot's parameters with which the replica of its loop does not hold."""
 
     autopilot: ClassVar[str]
     data_sheet: ClassVar[tuple[ModelParameter, ...]]
     """The parameters of copters under this autopilot in general."""
 
     options = step_options(largest_step_m=LARGEST_STEP_M)
-    output = ALTITUDE
-    error_unit = "m"
-    curves_title = "Altitude steps"
+    grid_hz = 50.0
     scored_from_s = CLIMB_S
-    target_channel = REFERENCE
-    set_points: SetPoints
     search = SimplexSearch(of_scale=0.5, evaluations=200)
     difference = 0.05
 
-    def __init__(
-        self,
-        *,
-        sequence: StepSequence = _SEQUENCE,
-        parameters: Mapping[str, float] | None = None,
-        model_parameters: tuple[ModelParameter, ...] | None = None,
-        unfit: tuple[Problem, ...] = (),
-    ) -> None:
-        """`unfit` are the autopilot's parameters with which the replica of its loop does not hold."""
-        self.title = f"Altitude steps under {self.autopilot}"
-        self.sequence: Final = sequence
-        self.set_points = sequence.set_points
-        self.window_s = sequence.ends_s
-        self.measure = f"{sequence}, under {self.autopilot}"
-        self.parameters: Final = dict(parameters or {})
-        self.model_parameters = self.data_sheet if model_parameters is None else model_parameters
-        self._unfit: Final = unfit
+    sequence: StepSequence = _SEQUENCE
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    model_parameters: tuple[ModelParameter, ...] = ()
+    unfit: tuple[Problem, ...] = ()
+
+    def __post_init__(self) -> None:
+        self.title = f"{self.curves_title} under {self.autopilot}"
+        self.set_points = self.sequence.set_points
+        self.window_s = self.sequence.ends_s
+        self.measure = f"{self.sequence}, under {self.autopilot}"
+        self.model_parameters = self.model_parameters or self.data_sheet
 
     @abstractmethod
     def loop(self, gains: Vector) -> AltitudeLoop:
@@ -136,10 +126,9 @@ class CopterSteps(ModelledExperiment):
         """The scored part of a flight."""
         return FlownSteps(set_points=self.set_points, begin_s=self.scored_from_s, end_s=self.window_s)
 
-    def configured(self, options: Mapping[str, OptionValue]) -> Self:
-        """The experiment with another sequence; itself if that is its own."""
-        sequence = self.sequence.chosen(options, self.options)
-        return self if sequence == self.sequence else self._with(sequence=sequence)
+    def with_sequence(self, sequence: StepSequence) -> Self:
+        """Another sequence of the same copter."""
+        return replace(self, sequence=sequence)
 
     def under(self, parameters: Mapping[str, float]) -> Self:
         """The experiment with these parameters of the autopilot. If the replica of its loop does not hold with one,
@@ -147,49 +136,16 @@ class CopterSteps(ModelledExperiment):
         try:
             return self.exactly_under(parameters)
         except InputError as error:
-            return self._with(unfit=error.problems)
+            return replace(self, unfit=error.problems)
 
     def exactly_under(self, parameters: Mapping[str, float]) -> Self:
         """The experiment with these parameters of the autopilot, with its own if there are none.
 
         Raises InputError for one with which the replica of its loop does not hold.
         """
-        changed = self._with(parameters=self.loop_parameters(parameters) or self.parameters)
+        changed = replace(self, parameters=self.loop_parameters(parameters) or self.parameters, unfit=())
         changed.loop(self.space.default)
         return changed
-
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same steps of another copter."""
-        return self._with(model_parameters=model_parameters)
-
-    def _with(
-        self,
-        *,
-        sequence: StepSequence | None = None,
-        parameters: Mapping[str, float] | None = None,
-        model_parameters: tuple[ModelParameter, ...] | None = None,
-        unfit: tuple[Problem, ...] = (),
-    ) -> Self:
-        return type(self)(
-            sequence=sequence or self.sequence,
-            parameters=self.parameters if parameters is None else parameters,
-            model_parameters=model_parameters or self.model_parameters,
-            unfit=unfit,
-        )
-
-    @property
-    def grid_s(self) -> Samples:
-        """Every 20 ms from the command to the first instant at or past the end of the window, shape (n,)."""
-        return np.arange(int(np.ceil(self.window_s * GRID_HZ)) + 1) / GRID_HZ
-
-    def errors(self, outputs: Matrix) -> Vector:
-        """Mean absolute distance from the reference, m, over the windows of the steps: (k, n) → (k,)."""
-        return self.sequence.errors(self.grid_s, outputs, self.followed_m)
-
-    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same for a recorded flight, against its recorded reference; raises TrajectoryError if it does not
-        count."""
-        return self.sequence.error(trajectory, accept_gaps=accept_gaps)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the model; before the first step, of its reference."""
@@ -214,7 +170,7 @@ class CopterSteps(ModelledExperiment):
         """Altitudes of simulated flights, and the margin from ringing, on a few copters of the distribution; nothing is
         simulated with parameters with which the replica does not hold. A known hover throttle that the autopilot's
         parameter does not suit is told."""
-        if self._unfit:
+        if self.unfit:
             return tuple(
                 Check(
                     "parameters",
@@ -224,7 +180,7 @@ class CopterSteps(ModelledExperiment):
                     worst=math.inf,
                     limit=0.0,
                 )
-                for each in self._unfit
+                for each in self.unfit
             )
         models = spread.sample(self, COPTERS)
         altitudes = self.outputs(np.tile(gains, (COPTERS, 1)), models)
@@ -265,26 +221,16 @@ class CopterSteps(ModelledExperiment):
 def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) -> tuple[Check, Check]:
     """Highest and lowest altitude of simulated flights, shape (k, n): below the ceiling, and above half of the lowest
     set point."""
-    highest_m, lowest_m = float(altitudes.max()), float(altitudes.min())
-    floor_m = 0.5 * min(set_points.altitudes_m)
-    rises = "rises to" if highest_m <= ceiling_m else "would rise to"
-    falls = "falls to" if lowest_m >= floor_m else "would fall to"
+    highest_m, lowest_m, floor_m = float(altitudes.max()), float(altitudes.min()), 0.5 * min(set_points.altitudes_m)
+
+    def check(name: str, end: str, verb: str, worst: float, limit: float, passed: bool) -> Check:
+        does = f"{verb}s" if passed else f"would {verb}"
+        flights = f"The {end} of {len(altitudes)} simulated flights {does} to {number(worst, 2)} m"
+        return Check(name, passed, f"{flights}; {limit:g} m is allowed.", worst=worst, limit=limit)
+
     return (
-        Check(
-            "altitude",
-            highest_m <= ceiling_m,
-            f"The highest of {len(altitudes)} simulated flights {rises} {highest_m:.2f} m; {ceiling_m:g} m is allowed.",
-            worst=highest_m,
-            limit=ceiling_m,
-        ),
-        Check(
-            "lowest altitude",
-            lowest_m >= floor_m,
-            f"The lowest of {len(altitudes)} simulated flights {falls} {number(lowest_m, 2)} m; "
-            f"{floor_m:g} m is allowed.",
-            worst=lowest_m,
-            limit=floor_m,
-        ),
+        check("altitude", "highest", "rise", highest_m, ceiling_m, highest_m <= ceiling_m),
+        check("lowest altitude", "lowest", "fall", lowest_m, floor_m, lowest_m >= floor_m),
     )
 
 

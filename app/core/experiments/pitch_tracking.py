@@ -72,11 +72,10 @@ def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
             f"ln_{'a' if column < STATES else 'b'}{row + 1}{column + 1 if column < STATES else column + 1 - STATES}",
             f"{'A' if column < STATES else 'B'}({_ROWS[row]}, {_COLUMNS[column]}) against the model",
             "ln ×",
-            nominal=0.0,
-            lower=-2.5,
             upper=2.5,
             prior_sd=PRIOR_SD,
             known_within=perturbation,
+            lower=-2.5,
         )
         for row, column in zip(*ELEMENTS, strict=True)
     )
@@ -121,27 +120,21 @@ class PitchTracking(ModelledExperiment):
         Option(name="model_seed", title="Seed that selects the inaccurate model", default=0, lower=0, upper=2**32 - 1),
     )
 
-    def __init__(
-        self, options: Mapping[str, OptionValue] | None = None, parameters: tuple[ModelParameter, ...] | None = None
-    ) -> None:
+    def __init__(self, options: Mapping[str, OptionValue] | None = None) -> None:
         """`options` must be free of problems."""
-        self._options: Final = with_defaults(options or {}, self.options)
-        perturbation = float(self._options["perturbation"])
-        self._system: Final = perturbed(perturbation, int(self._options["model_seed"]))
-        self.model_parameters = _parameters(perturbation) if parameters is None else parameters
+        chosen = with_defaults(options or {}, self.options)
+        perturbation = float(chosen["perturbation"])
+        self._system: Final = perturbed(perturbation, int(chosen["model_seed"]))
+        self.model_parameters = _parameters(perturbation)
         self._kept: tuple[bytes, Matrix] | None = None
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The experiment with another inaccurate model; settings missing in `options` have their defaults."""
         return type(self)(options)
 
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        """The same experiment on another aircraft."""
-        return type(self)(self._options, model_parameters)
-
     @property
     def grid_s(self) -> Samples:
-        """Every 0.02 s for a minute: shape (3001,)."""
+        """Every 0.02 s for a minute, shape (3001,); as multiples of the step, which differ in the last bit."""
         return np.arange(_SAMPLES, dtype=np.float64) * STEP_S
 
     def systems(self, model: Matrix | Vector) -> Matrix:

@@ -4,6 +4,7 @@ A takeoff is scored from the ground, where the reference trajectory, which does 
 of the error. Here each step is scored against that reference, so that only what the gains can change remains.
 """
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,7 +14,7 @@ import numpy as np
 
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.errors import Problem, TrajectoryError
-from app.core.experiments.base import Matrix
+from app.core.experiments.base import Experiment, Matrix
 from app.core.models.set_points import SetPoints, on_step
 from app.core.policy import Vector
 from app.core.records.metrics import SetPoint, mean_absolute_error, mean_absolute_errors, require_scorable
@@ -112,9 +113,36 @@ class StepSequence:
     def _time_s(self, number: int) -> float:
         return on_step(self.climb_s + number * self.step_window_s)
 
-    def errors(self, grid_s: Samples, altitudes: Matrix, reference: Samples) -> Vector:
+
+class StepsManoeuvre(Experiment):
+    """Steps of the altitude set point, scored by the distance from the autopilot's own reference."""
+
+    curves_title = "Altitude steps"
+    output = ALTITUDE
+    error_unit = "m"
+    target_channel = REFERENCE
+    sequence: StepSequence
+    set_points: SetPoints
+
+    @property
+    @abstractmethod
+    def followed_m(self) -> Samples:
+        """The reference in a model run, on the grid, shape (n,)."""
+
+    @abstractmethod
+    def with_sequence(self, sequence: StepSequence) -> Self:
+        """The experiment with another sequence."""
+
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """The experiment with another sequence; itself if that is its own."""
+        sequence = self.sequence.chosen(options, self.options)
+        return self if sequence == self.sequence else self.with_sequence(sequence)
+
+    def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute distance from the reference, m, over the windows of the steps: (k, n) → (k,)."""
-        return mean_absolute_errors(grid_s, altitudes, _follow(grid_s, reference), self.climb_s, self.ends_s)
+        grid_s, sequence = self.grid_s, self.sequence
+        follow = _follow(grid_s, self.followed_m)
+        return mean_absolute_errors(grid_s, outputs, follow, sequence.climb_s, sequence.ends_s)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight, against its recorded reference.
@@ -122,17 +150,17 @@ class StepSequence:
         Raises TrajectoryError if the record has gaps, does not cover the windows, lacks the reference, or if the
         vehicle had not settled before the first step.
         """
+        begin_s, end_s = self.sequence.climb_s, self.sequence.ends_s
         for channel in (ALTITUDE, REFERENCE):
-            begin_s = self.climb_s - SETTLED_FOR_S
-            require_scorable(trajectory, channel, begin_s, self.ends_s, accept_gaps=accept_gaps)
+            require_scorable(trajectory, channel, begin_s - SETTLED_FOR_S, end_s, accept_gaps=accept_gaps)
         time_s, altitude = trajectory.time_s, trajectory[ALTITUDE]
-        if (why := unsettled(time_s, altitude, self.climb_s, self.height_m)) is not None:
+        if (why := unsettled(time_s, altitude, begin_s, self.sequence.height_m)) is not None:
             raise TrajectoryError(
                 "This flight cannot be scored.",
                 problems=(Problem(ALTITUDE, why),),
                 hint="Choose gains that bring the vehicle to rest, or mark the flight invalid; the raw record is kept.",
             )
-        return mean_absolute_error(time_s, altitude, _follow(time_s, trajectory[REFERENCE]), self.climb_s, self.ends_s)
+        return mean_absolute_error(time_s, altitude, _follow(time_s, trajectory[REFERENCE]), begin_s, end_s)
 
 
 def _follow(time_s: Samples, reference: Samples) -> SetPoint:

@@ -17,12 +17,13 @@ from app.core.experiments.base import (
     ParameterDistribution,
     SimplexSearch,
 )
-from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights, check_wrapping
+from app.core.experiments.integer_overflow import check_wrapping
+from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
-from app.core.records.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Trajectory
 
 _STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
 
@@ -31,31 +32,17 @@ def _gain(name: str, title: str, upper: int, default: int) -> Gain:
     return Gain(name, title, "counts", lower=0, upper=upper, scale=upper / 10, default=default, integer=True)
 
 
-def _known(
-    name: str,
-    title: str,
-    unit: str,
-    upper: float,
-    prior_sd: float,
-    within: float,
-    *,
-    nominal: float = 0.0,
-    lower: float = 0.0,
-    expected: float | None = None,
-    flight_sd: float = 0.0,
-) -> ModelParameter:
-    return ModelParameter(name, title, unit, nominal, lower, upper, prior_sd, within, expected, flight_sd)
-
-
 MODEL_PARAMETERS: Final = (
-    _known("hover_throttle", "Hover throttle", "of full", 0.95, 0.09, 0.05, nominal=0.63, lower=0.3, flight_sd=0.002),
-    _known("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
-    _known("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
-    _known("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
-    _known("quadratic_share", "Quadratic share of thrust", "", 1.0, 0.5, 0.3),
-    _known("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
-    _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
-    _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
+    ModelParameter(
+        "hover_throttle", "Hover throttle", "of full", 0.95, 0.09, 0.05, nominal=0.63, lower=0.3, flight_sd=0.002
+    ),
+    ModelParameter("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
+    ModelParameter("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
+    ModelParameter("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
+    ModelParameter("quadratic_share", "Quadratic share of thrust", "", 1.0, 0.5, 0.3),
+    ModelParameter("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
+    ModelParameter("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
+    ModelParameter("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
 )
 """The nominal model has mass and thrust only: every other nominal value is zero. The expected values of the others are
 typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
@@ -69,6 +56,7 @@ class VerticalLoop(ModelledExperiment):
 
     output = "altitude_m"
     error_unit = "m"
+    grid_hz = RATE_HZ
     space = PolicySpace(
         (
             _gain("kp", "Proportional gain", 4000, 283),
@@ -84,21 +72,16 @@ class VerticalLoop(ModelledExperiment):
     """Time that the gate simulates beyond the window, at the last set point."""
     set_points: SetPoints
 
-    def __init__(self, model_parameters: tuple[ModelParameter, ...], set_points: SetPoints, window_s: float) -> None:
-        self.model_parameters = model_parameters
+    model_parameters = MODEL_PARAMETERS
+
+    def __init__(self, set_points: SetPoints, window_s: float) -> None:
         self.set_points = set_points
         self.window_s = window_s
         self._samples: Final = len(self.grid_s)
 
-    @property
-    def grid_s(self) -> Samples:
-        """As `grid_of` the window."""
-        return grid_of(self.window_s)
-
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
-        parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
-        channels, _ = fly(counts(gains), parameters, self.set_points, self._samples)
+        channels, _ = fly(counts(gains), self._models(model, 1)[0], self.set_points, self._samples)
         time_s = self.grid_s
         named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
         return Trajectory(time_s, named, "model", "simulation")
@@ -142,11 +125,6 @@ class VerticalLoop(ModelledExperiment):
 
     def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
         return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
-
-
-def grid_of(window_s: float) -> Samples:
-    """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
-    return np.arange(int(np.ceil(window_s * RATE_HZ)) + 1) / RATE_HZ
 
 
 def counts(gains: Vector | Matrix) -> Counts:

@@ -6,15 +6,15 @@ only with further evidence: the climb rate shows that the vehicle moved, the out
 rate is constant too, which never happens in flight.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.records.metrics import MAX_GAP_S
+from app.core.records.flight_events import AIRBORNE_M
+from app.core.records.metrics import MAX_GAP_S, MAX_STORED_GAP_S
 from app.core.records.trajectory import Samples, Trajectory
 
 
@@ -40,37 +40,14 @@ class Glitch:
     sentence: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Physics:
-    """Physical limits of an output, in its unit.
-
-    The largest acceleration, the smallest jump distinguishable from noise, the deviation from the start that means the
-    vehicle is airborne, the channel of its rate, and a second source of the same quantity.
-    """
-
-    largest_acceleration: float
-    smallest_jump: float
-    off_the_ground: float
-    rate: str
-    second: str
-    unit: str
-
-
-_PHYSICS: Final[Mapping[str, _Physics]] = MappingProxyType(
-    {
-        "altitude_m": _Physics(
-            largest_acceleration=30.0,
-            smallest_jump=0.1,
-            off_the_ground=0.1,
-            rate="climb_rate_m_s",
-            second="altitude_2_m",
-            unit="m",
-        )
-    }
-)
-"""30 m/s² upward takes a thrust of four times the weight; downward, gravity alone gives a third of it. Outputs without
-an entry, such as a pitch error, are checked for gaps only."""
-
+_ALTITUDE: Final = "altitude_m"
+"""The output whose physical limits are known. Others, such as a pitch error, are checked for gaps only."""
+_CLIMB_RATE: Final = "climb_rate_m_s"
+_SECOND_ALTITUDE: Final = "altitude_2_m"
+_LARGEST_ACCELERATION_M_S2: Final = 30.0
+"""Upward, this takes a thrust of four times the weight; downward, gravity alone gives a third of it."""
+_SMALLEST_JUMP_M: Final = 0.1
+"""The smallest that is distinguishable from noise."""
 _FROZEN_S: Final = 0.3
 _AROUND_S: Final = 0.15
 """Half width of the window in which the speed around a sample is measured."""
@@ -81,7 +58,6 @@ _LONGEST_EXCURSION_S: Final = 1.5
 """Two jumps that cancel each other within this time are one glitch, with everything between them."""
 _DISAGREEMENT: Final = 0.25
 _DISAGREEMENT_S: Final = 0.1
-_STAMP_RESOLUTION_S: Final = 1e-5
 
 Marks = list[tuple[int, int]]
 """Glitches as pairs of sample indices: the last good one before, and the first good one after."""
@@ -99,20 +75,20 @@ def find_glitches(experiment: ScoredOutput, trajectory: Trajectory) -> tuple[Gli
         return ()
     time_s = trajectory.time_s[scored]
     channels = {name: values[scored] for name, values in trajectory.channels.items() if len(values) == len(scored)}
-    gaps = [(int(i), int(i) + 1) for i in np.flatnonzero(np.diff(time_s) > MAX_GAP_S + _STAMP_RESOLUTION_S)]
+    gaps = [(int(i), int(i) + 1) for i in np.flatnonzero(np.diff(time_s) > MAX_STORED_GAP_S)]
     found = [_gap(time_s, first, last) for first, last in gaps]
-    if physics := _PHYSICS.get(experiment.output):
-        values = channels[experiment.output]
-        excess = _excess(time_s, values, physics)
-        frozen = _frozen(time_s, values, channels.get(physics.rate), excess, physics)
-        found.extend(_held(time_s, values, physics, mark) for mark in frozen)
+    if experiment.output == _ALTITUDE:
+        altitude = channels[_ALTITUDE]
+        excess = _excess(time_s, altitude)
+        frozen = _frozen(time_s, altitude, channels.get(_CLIMB_RATE), excess)
+        found.extend(_held(time_s, altitude, mark) for mark in frozen)
         others = [*gaps, *frozen]
         jumps = [
             mark for mark in _jumps(time_s, excess) if all(mark[1] < first or mark[0] > last for first, last in others)
         ]
-        found.extend(_jumped(time_s, values, physics, mark) for mark in jumps)
-        if physics.second in channels:
-            found.extend(_disagreements(time_s, values, channels[physics.second], physics))
+        found.extend(_jumped(time_s, altitude, mark) for mark in jumps)
+        if _SECOND_ALTITUDE in channels:
+            found.extend(_disagreements(time_s, altitude, channels[_SECOND_ALTITUDE]))
     return tuple(sorted(found, key=lambda glitch: (glitch.start_s, glitch.kind)))
 
 
@@ -146,26 +122,26 @@ def _gap(time_s: Samples, first: int, last: int) -> Glitch:
     return Glitch("gap", float(time_s[first]), float(time_s[last]), sentence)
 
 
-def _held(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int, int]) -> Glitch:
+def _held(time_s: Samples, altitude: Samples, mark: tuple[int, int]) -> Glitch:
     first, last = mark
     sentence = (
-        f"The same {values[first]:.2f} {physics.unit} for {time_s[last - 1] - time_s[first]:.2f} s from "
+        f"The same {altitude[first]:.2f} m for {time_s[last - 1] - time_s[first]:.2f} s from "
         f"{time_s[first]:.2f} s on: no vehicle in the air is that steady."
     )
     return Glitch("frozen", float(time_s[first]), float(time_s[last]), sentence)
 
 
-def _jumped(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int, int]) -> Glitch:
+def _jumped(time_s: Samples, altitude: Samples, mark: tuple[int, int]) -> Glitch:
     first, last = mark
     lasts = "" if last == first + 1 else f", and back {time_s[last] - time_s[first]:.2f} s later"
     sentence = (
-        f"A jump of {values[first + 1] - values[first]:+.2f} {physics.unit} at {time_s[first + 1]:.2f} s{lasts}: no "
+        f"A jump of {altitude[first + 1] - altitude[first]:+.2f} m at {time_s[first + 1]:.2f} s{lasts}: no "
         "thrust can accelerate a vehicle that much."
     )
     return Glitch("acceleration", float(time_s[first]), float(time_s[last]), sentence)
 
 
-def _excess(time_s: Samples, values: Samples, physics: _Physics) -> Samples:
+def _excess(time_s: Samples, altitude: Samples) -> Samples:
     """How far each step exceeds what the speed around it explains, shape (n − 1,); zero within the allowed range.
 
     The speed is the median of the steps within 0.15 s (of two on either side, where samples are sparser), and may
@@ -174,12 +150,12 @@ def _excess(time_s: Samples, values: Samples, physics: _Physics) -> Samples:
     """
     from scipy.ndimage import median_filter
 
-    duration_s, step = np.diff(time_s), np.diff(values)
+    duration_s, step = np.diff(time_s), np.diff(altitude)
     reach = max(2, round(_AROUND_S / float(np.median(duration_s))))
     beyond = step - median_filter(step / duration_s, size=2 * reach + 1, mode="nearest") * duration_s
     window_s = np.maximum(duration_s, reach * float(np.median(duration_s)))
     noise = _SD_OF_MEDIAN * float(np.median(np.abs(beyond)))
-    allowed = max(physics.smallest_jump, _OUT_OF_NOISE * noise) + physics.largest_acceleration * window_s * duration_s
+    allowed = max(_SMALLEST_JUMP_M, _OUT_OF_NOISE * noise) + _LARGEST_ACCELERATION_M_S2 * window_s * duration_s
     return np.where(np.abs(beyond) > allowed, beyond, 0.0)
 
 
@@ -201,33 +177,33 @@ def _jumps(time_s: Samples, excess: Samples) -> Marks:
     return marks
 
 
-def _frozen(time_s: Samples, values: Samples, rate: Samples | None, excess: Samples, physics: _Physics) -> Marks:
+def _frozen(time_s: Samples, altitude: Samples, rate: Samples | None, excess: Samples) -> Marks:
     """Runs of one constant value in the air during which the vehicle moved."""
     marks: Marks = []
-    for first, last in _runs(np.diff(values) == 0.0):
+    for first, last in _runs(np.diff(altitude) == 0.0):
         held_s = time_s[last] - time_s[first]
-        in_the_air = values[first] > values[0] + physics.off_the_ground
+        in_the_air = altitude[first] > altitude[0] + AIRBORNE_M
         if held_s < _FROZEN_S or not in_the_air:
             continue
         during = slice(first, last + 1)
-        moved = rate is not None and abs(float(np.trapezoid(rate[during], time_s[during]))) > physics.smallest_jump
+        moved = rate is not None and abs(float(np.trapezoid(rate[during], time_s[during]))) > _SMALLEST_JUMP_M
         rate_held = rate is not None and not np.ptp(rate[during])
         jumped = last < len(excess) and excess[last] != 0.0
         if moved or rate_held or jumped:
-            marks.append((first, min(last + 1, len(values) - 1)))
+            marks.append((first, min(last + 1, len(altitude) - 1)))
     return marks
 
 
-def _disagreements(time_s: Samples, values: Samples, second: Samples, physics: _Physics) -> Iterator[Glitch]:
+def _disagreements(time_s: Samples, altitude: Samples, second: Samples) -> Iterator[Glitch]:
     """Intervals in which two sources differ by more than their usual offset (that of their datums)."""
-    apart = values - second
+    apart = altitude - second
     apart = np.abs(apart - np.median(apart))
     for first, last in _runs((apart > _DISAGREEMENT)[1:]):
-        before, after = first, min(last + 1, len(values) - 1)
+        before, after = first, min(last + 1, len(altitude) - 1)
         if time_s[after] - time_s[before] < _DISAGREEMENT_S:
             continue
         sentence = (
-            f"The two sources differ by up to {apart[before + 1 : last + 1].max():.2f} {physics.unit} more than "
+            f"The two sources differ by up to {apart[before + 1 : last + 1].max():.2f} m more than "
             f"elsewhere, from {time_s[before]:.2f} to {time_s[after]:.2f} s."
         )
         yield Glitch("disagreement", float(time_s[before]), float(time_s[after]), sentence)

@@ -21,8 +21,8 @@ SETTLING_BAND: Final = 0.05
 STEADY_S: Final = 5.0
 """The steady-state error is the mean of this last part of the window."""
 MAX_GAP_S: Final = 0.25
-_STAMP_RESOLUTION_S: Final = 1e-5
-"""Stored time stamps are single precision: 4 µs at half a minute."""
+MAX_STORED_GAP_S: Final = MAX_GAP_S + 1e-5
+"""The same between stored time stamps, which are single precision: 4 µs at half a minute."""
 
 SetPoint = Callable[[Samples], Samples]
 
@@ -110,7 +110,7 @@ def _gap(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
     first = max(int(np.searchsorted(time_s, start_s, side="right")) - 1, 0)
     last = int(np.searchsorted(time_s, stop_s, side="left"))
     gaps = np.diff(time_s[first : last + 1])
-    if gaps.size and gaps.max() > MAX_GAP_S + _STAMP_RESOLUTION_S:
+    if gaps.size and gaps.max() > MAX_STORED_GAP_S:
         at = first + int(np.argmax(gaps))
         return Problem(
             "time_s", f"has a gap of {gaps.max():.3g} s after {time_s[at]:.3f} s; {MAX_GAP_S:g} s is allowed"

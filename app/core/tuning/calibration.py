@@ -161,7 +161,7 @@ class _Fit:
 
     def __init__(self, experiment: ModelledExperiment, flights: Sequence[Flight]) -> None:
         self.experiment = experiment
-        self.mean = np.array([parameter.prior_mean for parameter in experiment.model_parameters])
+        self.mean = experiment.prior_mean
         self.sd = experiment.prior_sd
         self.lower, self.upper = experiment.limits
         self.flight_sd = _flight_sd(experiment)

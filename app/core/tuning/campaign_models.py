@@ -21,7 +21,7 @@ from app.core.experiments.base import (
     prior_distribution,
 )
 from app.core.experiments.copter_steps import COPTERS, CopterSteps
-from app.core.experiments.takeoff import Takeoff
+from app.core.experiments.takeoff import COARSE_S, Takeoff
 from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Box, Vector
 from app.core.tuning.calibration import Calibration, calibrate
@@ -37,8 +37,6 @@ error on vehicles that match the fit, a smaller one on those that do not."""
 
 _POINTS: Final = 64
 _EVALUATIONS: Final = (60, 40)
-_DIGITS: Final = 9
-"""Merits are rounded to nanometres: smaller differences vary between machines."""
 
 _ZEROS: Final = {"kp": 40.0, "ki": 10.0, "kd": 4.0}
 """Added to the gains of altitude steps, of which the search takes the logarithm: a hundredth of their ranges."""
@@ -102,7 +100,7 @@ class TakeoffModel(VerticalModel[Takeoff]):
 
     def merits(self, gains: Matrix) -> Vector:
         """What `optimum` minimises, in the error's unit: (c, n) → (c,)."""
-        return merit(self._experiment, gains, self._models)
+        return self._experiment.merits(gains, self._models)
 
     def is_worth_a_flight(self, here: Vector, there: Vector) -> bool:
         """Whether the step from `here`, which was flown, is predicted to pay."""
@@ -114,54 +112,34 @@ class TakeoffModel(VerticalModel[Takeoff]):
         return ()
 
 
-def merit(experiment: Takeoff, gains: Matrix, models: Matrix, until_s: float | None = None) -> Vector:
-    """Mean error over the models, m, plus the penalty for unsafe flights: gains (c, 3), models (k, m) → (c,).
-
-    The penalty is one metre per metre by which a policy rises more than 0.6 m above the set point on any model, or
-    stays that far below it after five seconds; both limits keep a margin from what is unsafe.
-    `until_s` is the time up to which flights are simulated, by default the finer of the experiment's.
-    """
-    sketches = experiment.sketches(gains, models, experiment.sketches_s[1] if until_s is None else until_s)
-    lowest_m, highest_m = experiment.expected_m
-    beyond = np.maximum(sketches.highest_m - highest_m, 0.0) + np.maximum(lowest_m - sketches.lowest_m, 0.0)
-    return np.asarray(np.round(sketches.errors.mean(axis=1) + beyond.max(axis=1), _DIGITS))
-
-
 def find_robust_optimum(experiment: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
-    """The gains with the least `merit` found in the box, shape (n,); `known` (c, n) are included in the first points.
+    """The gains with the least merit found in the box, shape (n,); `known` (c, n) are included in the first points.
 
     A fixed set of points spread over the box is evaluated first, on shorter flights and on half the models; then
     Nelder–Mead on integer counts starts from the best two.
     """
     spread = box.low + halton(len(box.low), _POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))
-    first = merit(experiment, points, models[::2], experiment.sketches_s[0])
+    first = experiment.merits(points, models[::2], COARSE_S)
     starts = points[np.argsort(first, kind="stable")[: len(_EVALUATIONS)]]
 
     @cache
     def flown(counts: tuple[float, ...]) -> float:
-        return float(merit(experiment, np.array([counts]), models)[0])
+        return float(experiment.merits(np.array([counts]), models)[0])
 
     def fine(gains: Vector) -> float:
         return flown(tuple(box.nearest(gains).tolist()))
 
     steps = (box.high - box.low) / 10.0
     ends = [
-        box.nearest(minimise_in_box(fine, start, steps, box.low, box.high, evaluations=evaluations, tolerance=1.0))
+        box.nearest(minimise_in_box(fine, start, steps, box, evaluations=evaluations, tolerance=1.0))
         for start, evaluations in zip(starts, _EVALUATIONS, strict=True)
     ]
     return ends[int(np.argmin([fine(end) for end in ends]))]
 
 
 def minimise_in_box(
-    error: Callable[[Vector], float],
-    start: Vector,
-    steps: Vector,
-    low: Vector,
-    high: Vector,
-    *,
-    evaluations: int,
-    tolerance: float,
+    error: Callable[[Vector], float], start: Vector, steps: Vector, box: Box, *, evaluations: int, tolerance: float
 ) -> Vector:
     """Minimise `error` within the box and return the final point, shape (n,).
 
@@ -170,12 +148,12 @@ def minimise_in_box(
     """
     from scipy.optimize import minimize
 
-    inward = np.where(start > (low + high) / 2.0, -steps, steps)
+    inward = np.where(start > (box.low + box.high) / 2.0, -steps, steps)
     found = minimize(
         error,
         start,
         method="Nelder-Mead",
-        bounds=list(zip(low, high, strict=True)),
+        bounds=list(zip(box.low, box.high, strict=True)),
         options={
             "initial_simplex": np.vstack((start, start + np.diag(inward))),
             "maxfev": evaluations,

@@ -139,6 +139,7 @@ class CopterModel(LimitedModel[Copter]):
         self.base = best_flight(used)
         self.numbers: Final = tuple(flight.number for flight in used)
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
+        self._log: Final = self._logs[self.base.number]
         self._experiment: Final = experiment.exactly_under(self.base.parameters)
         self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
         if (why := find_unexplained(self._estimate)) is not None:
@@ -173,10 +174,6 @@ class CopterModel(LimitedModel[Copter]):
     @cached_property
     def vehicles(self) -> Sequence[Copter]:
         return [copter_of(model) for model in self.spread.sample(self._experiment, COPTERS)]
-
-    @property
-    def _log(self) -> LoggedFlight:
-        return self._logs[self.base.number]
 
     @cached_property
     def _likeliest(self) -> FlightModel:

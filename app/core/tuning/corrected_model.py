@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.tuning.evidence import Evidence, has_model
 from app.core.tuning.strategy import ModelPrediction
-
-if TYPE_CHECKING:
-    from scipy.optimize import OptimizeResult
 
 
 def resample_to_grid(experiment: Experiment, flight: Flight) -> Samples:
@@ -137,17 +134,11 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
     def error(gains: Vector) -> float:
         return rounded_error(tuple(space.nearest(gains).tolist()))
 
-    course: list[float] = []
-
-    def follow(intermediate_result: "OptimizeResult") -> None:
-        course.append(float(intermediate_result.fun))
-
     simplex = np.vstack((start, start + np.diag(_first_steps(search, space, start))))
     found = minimize(
         error,
         start,
         method="Nelder-Mead",
-        callback=follow,
         bounds=list(zip(space.lower, space.upper, strict=True)) if search.bounded else None,
         options={
             "initial_simplex": simplex,
@@ -155,9 +146,10 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
             "maxiter": search.iterations or _UNLIMITED,
             "xatol": 0.0,
             "fatol": 0.0,
+            "return_all": True,
         },
     )
-    return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev), tuple(course))
+    return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev), tuple(map(error, found.allvecs[1:])))
 
 
 def start_gains(evidence: Evidence[Experiment]) -> dict[str, float]:

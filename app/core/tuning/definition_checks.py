@@ -25,16 +25,6 @@ _LARGEST_DEVIATION: Final = 100.0
 """Far beyond the range of every parameter of a vehicle's model; the square of any such number is finite."""
 
 
-def check_definition(definition: Definition, experiments: Mapping[str, Experiment]) -> None:
-    """Raise InputError naming every field that cannot be used."""
-    if problems := problems_of(definition, experiments):
-        raise InputError(
-            "Invalid campaign definition.",
-            problems=problems,
-            hint="Correct the fields listed, then try again; nothing was changed.",
-        )
-
-
 def problems_of(definition: Definition, experiments: Mapping[str, Experiment]) -> tuple[Problem, ...]:
     """All problems of a definition with one of these experiments, each with its field (`stop.max_flights`, …)."""
     experiment = experiments.get(definition.experiment)
@@ -100,74 +90,60 @@ def _policy(definition: Definition, experiment: Experiment | None) -> Iterator[P
     except InputError as error:
         yield from error.problems
     try:
-        _check_start(definition, experiment, space)
+        yield from _start(definition, experiment, space)
     except InputError as error:
         yield from error.problems
 
 
-def _check_start(definition: Definition, experiment: Experiment, space: PolicySpace) -> None:
+def _start(definition: Definition, experiment: Experiment, space: PolicySpace) -> Iterator[Problem]:
+    """Raises InputError for gains that are missing, unknown or refused."""
     start = definition.start
-    brings_gains = start.kind in {"given", "campaign"}
-    if brings_gains != (start.gains is not None):
-        needed = f"are required with start.kind {start.kind!r}"
-        reason = needed if start.gains is None else f"are not allowed with start.kind {start.kind!r}"
-        raise _invalid_start(Problem("start.gains", reason))
-    if (start.kind == "campaign") != (start.donor is not None):
-        reason = "is required with start.kind 'campaign', and not allowed with any other"
-        raise _invalid_start(Problem("start.donor", reason))
-    if start.log is not None:
-        _check_log(definition, experiment, start.log)
-    if start.kind == "given" and start.gains is not None:
+    if (start.kind in {"given", "campaign"}) != (start.gains is not None):
+        required = "required" if start.gains is None else "not allowed"
+        yield Problem("start.gains", f"are {required} with start.kind {start.kind!r}")
+    elif (start.kind == "campaign") != (start.donor is not None):
+        yield Problem("start.donor", "is required with start.kind 'campaign', and not allowed with any other")
+    elif start.log is not None and (problems := tuple(_log(definition, experiment, start.log))):
+        yield from problems
+    elif start.kind == "given" and start.gains is not None:
         space.check(start.gains, field="start.gains")
     elif start.kind != "simplex":
-        given = start.gains or space.mapping(space.default)
-        _check_bounds_hold(space, space.complete(given, field="start.gains"))
+        yield from _left_out(space, space.complete(start.gains or space.mapping(space.default), field="start.gains"))
 
 
-def _check_log(definition: Definition, experiment: Experiment, log: LogEvidence) -> None:
+def _log(definition: Definition, experiment: Experiment, log: LogEvidence) -> Iterator[Problem]:
     if definition.start.kind != "given" or not isinstance(experiment, CopterSteps):
         reason = "is allowed only with start.kind 'given', for altitude steps under ArduCopter or PX4"
-        raise _invalid_start(Problem("start.log", reason))
+        yield Problem("start.log", reason)
+        return
     known = {each.name: (each.lower, each.upper) for each in experiment.model_parameters}
     if log.vehicle.keys() != known.keys():
-        reason = f"must have {', '.join(known)}"
-        raise _invalid_start(Problem("start.log.vehicle", reason))
-    wrong = tuple(
+        yield Problem("start.log.vehicle", f"must have {', '.join(known)}")
+        return
+    wrong = [
         Problem(
             f"start.log.vehicle.{name}",
             f"must be {low:g} … {high:g}, with a standard deviation of 0 … {_LARGEST_DEVIATION:g}",
         )
         for name, (low, high) in known.items()
         if not (low <= log.vehicle[name][0] <= high and 0.0 <= log.vehicle[name][1] <= _LARGEST_DEVIATION)
-    )
-    if wrong:
-        raise _invalid_start(*wrong)
+    ]
+    yield from wrong or _unmodelled(experiment, log)
+
+
+def _unmodelled(experiment: CopterSteps, log: LogEvidence) -> Iterator[Problem]:
     try:
         experiment.exactly_under(log.parameters)
     except InputError as error:
-        problems = (Problem(f"start.log.parameters.{each.field}", each.reason) for each in error.problems)
-        raise _invalid_start(*problems) from error
+        yield from (Problem(f"start.log.parameters.{each.field}", each.reason) for each in error.problems)
 
 
-def _invalid_start(*problems: Problem) -> InputError:
-    return InputError("Invalid start.", hint="", problems=problems)
-
-
-def _check_bounds_hold(space: PolicySpace, gains: Mapping[str, float]) -> None:
+def _left_out(space: PolicySpace, gains: Mapping[str, float]) -> Iterator[Problem]:
     """Gains that the definition does not name are not at fault: the bounds are, because they leave them out."""
-    left_out = [gain for gain in space.gains if gain.refusal_by_bounds(gains[gain.name]) is not None]
-    if left_out:
-        raise InputError(
-            "Invalid bounds.",
-            hint="Choose bounds that hold the start gains, or another start.",
-            problems=tuple(
-                Problem(
-                    f"bounds.{gain.name}",
-                    f"must hold the start gain {gains[gain.name]:g}, got {gain.lower:g} … {gain.upper:g}",
-                )
-                for gain in left_out
-            ),
-        )
+    for gain in space.gains:
+        if gain.refusal_by_bounds(gains[gain.name]) is not None:
+            found = f"got {gain.lower:g} … {gain.upper:g}"
+            yield Problem(f"bounds.{gain.name}", f"must hold the start gain {gains[gain.name]:g}, {found}")
 
 
 def _fractions(definition: Definition) -> Iterator[Problem]:

@@ -210,12 +210,8 @@ def interval_scale(flights: Sequence[Flight]) -> float:
 
 def _sample_outputs(experiment: ModelledExperiment, gains: Vector, base: Flight | None) -> Matrix:
     """Outputs of these gains on the sampled models, shape (k, n), each with its own bias if there is a base."""
-    parameters = experiment.model_parameters
-    prior = normal_distribution(
-        np.array([parameter.prior_mean for parameter in parameters]),
-        np.diag([parameter.prior_sd**2 for parameter in parameters]),
-        origin="the priors of a fit",
-    )
+    variances = [parameter.prior_sd**2 for parameter in experiment.model_parameters]
+    prior = normal_distribution(experiment.prior_mean, np.diag(variances), origin="the priors of a fit")
     models = prior.sample(experiment, MODELS)
     proposed = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
     if base is None:

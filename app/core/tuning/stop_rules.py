@@ -10,7 +10,6 @@ campaign's bounds, flown by overruling a refusal, would be refused again and are
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Final, Literal
 
 from app.core.definition import Flight, StopRule, aborted_by_gains
@@ -109,17 +108,8 @@ def _is_repeat(flights: Sequence[Flight], place: int) -> bool:
     return any(earlier.error is not None and earlier.gains == flights[place].gains for earlier in flights[:place])
 
 
-def landing_battery_v(record: Trajectory) -> float | None:
-    """Battery voltage at the end of a flight, V; None if not recorded."""
-    return _battery_v(record, -1)
-
-
-def starting_battery_v(record: Trajectory) -> float | None:
-    """Battery voltage at the start of a flight, V; None if not recorded."""
-    return _battery_v(record, 0)
-
-
-def _battery_v(record: Trajectory, sample: int) -> float | None:
+def battery_v(record: Trajectory, sample: int) -> float | None:
+    """Battery voltage in the first sample, 0, or the last, -1, of a flight, V; None if not recorded."""
     recorded = record.channels.get("battery_v")
     return float(recorded[sample]) if recorded is not None and len(recorded) else None
 
@@ -201,7 +191,7 @@ def _ended(
     return None
 
 
-_NONE_BETTER: Final = MappingProxyType({0: "No other gains were flown.", 1: "The other gain set flown is not better."})
+_NONE_BETTER: Final = {0: "No other gains were flown.", 1: "The other gain set flown is not better."}
 
 _NO_STEP: Final = "No further step is flown:"
 

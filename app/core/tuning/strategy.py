@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Literal, Protocol
 
-from app.core.definition import Interval, Option
+from app.core.definition import Interval, Option, Prediction
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
 from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -36,12 +36,10 @@ def positive_interval(lower: float, upper: float) -> Interval:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ModelPrediction:
-    """Output and error that a model predicts for one gain set; with an interval if the model has one of its own."""
+class ModelPrediction(Prediction):
+    """The same with the output that a model predicts; the interval is the model's own, if it has one."""
 
     trajectory: Trajectory
-    error: float
-    interval: Interval | None = None
 
 
 class Predictor(Protocol):

@@ -45,20 +45,20 @@ class Transfer:
     sentence: str = ""
 
 
-def transfer(plain: Evidence[ModelledExperiment]) -> Transfer:
+def transfer(campaign: Evidence[ModelledExperiment]) -> Transfer:
     """The evidence with the model and the step limit that follow from the donor's flight and with the autopilot's
     parameters as flown, before the first own flight those of the donor's, whose vehicle is of the same kind.
 
     The transfer is computed from the first valid flight, for the whole campaign; only the next step is shortened.
     """
-    donor, valid = plain.donor, plain.valid
-    flown = plain.flights if donor is None else (donor, *plain.flights)
+    donor, valid = campaign.donor, campaign.valid
+    flown = campaign.flights if donor is None else (donor, *campaign.flights)
 
     def modelled(experiment: ModelledExperiment, share: float = 1.0) -> Evidence[ModelledExperiment]:
-        definition = replace(plain.definition, step_fraction=plain.definition.step_fraction * share)
-        return replace(plain, definition=definition, experiment=as_flown(experiment, flown), plain=plain)
+        definition = replace(campaign.definition, step_fraction=campaign.definition.step_fraction * share)
+        return replace(campaign, definition=definition, experiment=as_flown(experiment, flown))
 
-    experiment = plain.experiment
+    experiment = campaign.experiment
     if donor is None or not valid:
         return Transfer(evidence=modelled(experiment))
     agreed, apart, own = _agreement(experiment, donor, valid[0])

@@ -244,9 +244,9 @@ def test_a_fitted_model_keeps_the_window() -> None:
 def test_shortened_takeoffs_end_with_the_window_at_the_latest() -> None:
     chosen = TAKEOFF.configured({"window_s": 10.0})
     policy = np.array([[1600.0, 1023, 127]])
-    sketches = chosen.sketches(policy, TWIN_MODEL[np.newaxis], until_s=12.0)
+    merits = chosen.merits(policy, TWIN_MODEL[np.newaxis], until_s=12.0)
     exact = chosen.errors(chosen.outputs(policy, TWIN_MODEL))
-    assert sketches.errors[0] == pytest.approx(exact, abs=2e-3)
+    assert merits == pytest.approx(exact, abs=2e-3)
 
 
 @pytest.mark.parametrize(("window_s", "sd"), [(10.0, 0.03423), (32.6, 0.0105), (60.0, 0.0105)])

@@ -18,7 +18,7 @@ from app.core.tuning.proposals import advise
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
-from tests.core.tuning.defined import check_definition, evidence, next_proposal, problems_of
+from tests.core.tuning.defined import evidence, next_proposal, problems_of
 
 PX4 = get_experiment("takeoff-px4")
 BY_HAND: Final = Definition(experiment="takeoff-px4", strategy="manual", stop=StopRule(kind="budget", max_flights=5))
@@ -106,7 +106,7 @@ def test_strategies_say_themselves_what_they_work_with() -> None:
 
 
 def test_a_start_that_is_searched_on_a_model_is_refused_where_there_is_none() -> None:
-    check_definition(replace(BY_HAND, start=Start(kind="given", gains=dict(FIRMER))))
+    assert problems_of(replace(BY_HAND, start=Start(kind="given", gains=dict(FIRMER)))) == ()
     (problem,) = problems_of(replace(BY_HAND, start=Start(kind="simplex")))
     assert problem.field == "start.kind"
     assert "there is no model for the gains of 'takeoff-px4': choose 'default' or 'given'" in problem.reason
@@ -132,7 +132,7 @@ def test_a_campaign_by_hand_proposes_the_start_and_then_the_best_flown_and_predi
 def test_a_warm_start_takes_the_others_gains_and_nothing_else() -> None:
     start = Start(kind="campaign", gains=dict(FIRMER), donor=Donor(campaign_id=1, trial_number=2, checksum=64 * "0"))
     definition = replace(BY_HAND, start=start)
-    check_definition(definition)
+    assert problems_of(definition) == ()
     assert said(next_proposal(definition, (), donor=FLOWN[1])) == ("start", FIRMER)
 
 

@@ -32,7 +32,7 @@ def models(count: int) -> Matrix:
         covariance=tuple(tuple(row) for row in covariance.tolist()),
         origin="",
     )
-    return spread.draw_random(Takeoff(), count, seed=1)
+    return spread.models(Takeoff(), np.random.default_rng(1).random((count, len(spread.mean))))
 
 
 def gain_sets(count: int) -> Counts:

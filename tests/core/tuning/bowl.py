@@ -19,7 +19,7 @@ from app.core.experiments.base import (
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 
-OFFSET: Final = ModelParameter("offset", "Offset", "m", 0.0, -1.0, 1.0, prior_sd=0.1, known_within=0.5)
+OFFSET: Final = ModelParameter("offset", "Offset", "m", upper=1.0, prior_sd=0.1, known_within=0.5, lower=-1.0)
 
 
 class QuadraticExperiment(ModelledExperiment):
@@ -36,14 +36,12 @@ class QuadraticExperiment(ModelledExperiment):
         )
     )
     options = ()
+    model_parameters = (OFFSET,)
     scatter = Scatter(sd=0.01, degrees_of_freedom=4.0)
     search = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
     difference = 0.1
     window_s = 1.0
     measure = "a bowl"
-
-    def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:
-        self.model_parameters = model_parameters
 
     @property
     def grid_s(self) -> Samples:
@@ -51,9 +49,6 @@ class QuadraticExperiment(ModelledExperiment):
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         return self
-
-    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
-        return type(self)(model_parameters)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         return Trajectory(self.grid_s, {"depth": self.outputs(gains[np.newaxis], model)[0]}, "model", "simulation")

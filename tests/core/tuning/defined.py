@@ -39,10 +39,6 @@ def problems_of(definition: Definition) -> tuple[Problem, ...]:
     return definition_checks.problems_of(definition, EXPERIMENTS)
 
 
-def check_definition(definition: Definition) -> None:
-    definition_checks.check_definition(definition, EXPERIMENTS)
-
-
 def evidence(
     definition: Definition,
     experiment: _E,

@@ -136,7 +136,8 @@ def test_a_refusal_is_overruled_on_a_simulated_vehicle_and_on_a_real_one_by_nobo
 def test_random_models_are_of_the_distribution_that_the_gate_samples() -> None:
     """Half as much again as known lies outside of both: they end at two standard deviations, and at zero."""
     spread = prior_distribution(TAKEOFF)
-    for models in (spread.sample(TAKEOFF, 200), spread.draw_random(TAKEOFF, 200, seed=1)):
+    at_random = np.random.default_rng(1).random((200, len(spread.mean)))
+    for models in (spread.sample(TAKEOFF, 200), spread.models(TAKEOFF, at_random)):
         for values, parameter in zip(models.T, TAKEOFF.model_parameters, strict=True):
             assert values.min() >= max(parameter.nominal - parameter.known_within - 1e-12, parameter.lower)
             assert values.max() <= parameter.nominal + parameter.known_within + 1e-12

@@ -65,7 +65,8 @@ def test_before_the_first_flight_the_interval_is_what_a_fit_would_take_for_likel
 
 def test_an_interval_is_where_the_likely_models_are_and_holds_the_prediction() -> None:
     """The data sheet says offset 0, experience 0.8."""
-    bowl = QuadraticExperiment((replace(OFFSET, expected=0.8, prior_sd=0.05),))
+    bowl = QuadraticExperiment()
+    bowl.model_parameters = (replace(OFFSET, expected=0.8, prior_sd=0.05),)
     found = with_interval(evidence(Definition(), bowl, []), proposal(30, 40), base=None)
     assert found.interval is not None
     assert found.predicted is not None

@@ -8,7 +8,7 @@ import pytest
 from app.core.definition import Definition, Flight, StopRule
 from app.core.experiments.base import Experiment
 from app.core.tuning.evidence import Evidence
-from app.core.tuning.stop_rules import decide_stop, evaluate_stop_rule, landing_battery_v, starting_battery_v
+from app.core.tuning.stop_rules import battery_v, decide_stop, evaluate_stop_rule
 from app.core.tuning.strategy import Explanation, Proposal
 from tests.core.tuning.bowl import QuadraticExperiment, fly
 from tests.core.tuning.defined import evidence
@@ -132,11 +132,11 @@ def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "
 
 def test_the_battery_is_read_at_both_ends_of_a_record() -> None:
     flight = fly(1, 30, 40)
-    assert (starting_battery_v(flight.trajectory), landing_battery_v(flight.trajectory)) == (None, None)
+    assert (battery_v(flight.trajectory, 0), battery_v(flight.trajectory, -1)) == (None, None)
     channels = {**flight.trajectory.channels, "battery_v": np.linspace(11.1, 10.4, len(flight.trajectory))}
     recorded = replace(flight.trajectory, channels=channels)
-    assert starting_battery_v(recorded) == pytest.approx(11.1)
-    assert landing_battery_v(recorded) == pytest.approx(10.4)
+    assert battery_v(recorded, 0) == pytest.approx(11.1)
+    assert battery_v(recorded, -1) == pytest.approx(10.4)
 
 
 STEP = Proposal(kind="step", gains={}, predicted=None, predicted_error=None, explanation=Explanation(summary="A step."))

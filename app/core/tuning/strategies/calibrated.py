@@ -41,7 +41,7 @@ def propose(evidence: Evidence[ModelledExperiment]) -> Proposal:
 
     Raises TypeError for experiments without such a model, and TrajectoryError if a record does not suffice for it.
     """
-    space, flights, model = evidence.space, evidence.flights, fitted_model(evidence)
+    space, flights, model = evidence.space, evidence.flights, fit(evidence)
     base = model.base
     fraction = min(trust_fraction(flights), evidence.definition.step_fraction)
     box = Box(*space.reachable(space.vector(base.gains), fraction))
@@ -84,11 +84,6 @@ def trust_fraction(flights: Sequence[Flight]) -> float:
                 fraction = min(fraction * _GROW, 1.0)
         is_calibrated = is_calibrated or flight.outcome == "valid"
     return fraction
-
-
-def fitted_model(evidence: Evidence[ModelledExperiment]) -> CampaignModel:
-    """The calibrated model. At least one flight must be valid."""
-    return fit(evidence)
 
 
 def _choose(evidence: Evidence[ModelledExperiment], model: CampaignModel, box: Box) -> _ChosenGains:
@@ -181,6 +176,6 @@ CALIBRATED: Final = Strategy(
     line="Fits the model to all flights and flies its robust optimum. Typically two flights.",
     options=(),
     propose=propose,
-    model=fitted_model,
+    model=fit,
     kinds=FITTED,
 )

@@ -62,9 +62,7 @@ def evaluate_lengths(line: SearchLine, lengths: Sequence[float], model: Correcte
 
 SCALED_LADDER: Final = tuple(2.0**power for power in range(3, -13, -1))
 RAW_LADDER: Final = tuple(10.0 ** (tenths / 10) for tenths in range(30, -1, -1))
-"""Step lengths if a gain is an integer."""
-RAW_REAL_LADDER: Final = SCALED_LADDER
-"""Step lengths if all gains are real: a step of 1 may be far too long."""
+"""Step lengths in gains' units if one is an integer; for real gains alone, a step of 1 may be far too long."""
 MIN_DIFFERENCE: Final = 2.0
 _HALVINGS: Final = 24
 _OUTSIDE: Final = "The correction is added outside the control loop, as a bias over time"
@@ -99,7 +97,7 @@ def _metric(space: PolicySpace, *, scaled: bool) -> _Metric:
     if scaled:
         return _Metric(space.scale, SCALED_LADDER, "gain scale")
     whole = any(gain.integer for gain in space.gains)
-    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain unit")
+    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else SCALED_LADDER, "gain unit")
 
 
 def longest_step(space: PolicySpace, scale: Vector, flights: Sequence[Flight]) -> float | None:

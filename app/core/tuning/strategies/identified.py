@@ -15,7 +15,7 @@ by Gauss–Newton with a limited step; the noise σ of each state is re-estimate
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -55,7 +55,6 @@ _SMALLEST: Final = 1e-12
 _MIN_RECORD: Final = WINDOW_STEPS + 1
 
 _STARTS: Final = 256
-_SEARCHES: Final = 1
 _RESTARTS: Final = 8
 _SEARCH_TOLERANCE: Final = 1e-4
 _MODELS: Final = 48
@@ -272,17 +271,12 @@ def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vec
 
     Each search is restarted from its end until it no longer improves.
     """
-    reach = PolicySpace(
-        tuple(
-            replace(gain, lower=float(lower), upper=float(upper))
-            for gain, lower, upper in zip(space.gains, low, high, strict=True)
-        )
-    )
+    bounds = zip(low.tolist(), high.tolist(), strict=True)
+    reach = space.narrowed(dict(zip(space.names, bounds, strict=True)))
     spread = low + (high - low) * halton(len(low), _STARTS)
     starts = np.vstack((base, reach.nearest(space.default), spread))
     errors = uncorrected_model(aircraft).errors(starts)
-    likely = starts[np.argsort(errors, kind="stable")[:_SEARCHES]]
-    ends = [_restarted(aircraft, reach, start) for start in (*likely, base)]
+    ends = [_restarted(aircraft, reach, start) for start in (starts[np.argmin(errors)], base)]
     return min(ends, key=lambda end: end.error)
 
 

@@ -13,7 +13,7 @@ from app.core.formatting import short
 from app.core.policy import Box
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
-from app.core.tuning.campaign_models import find_robust_optimum, merit
+from app.core.tuning.campaign_models import find_robust_optimum
 from app.core.tuning.predictions import predict_flight, remaining_biases
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.calibrated import CALIBRATED, propose
@@ -235,7 +235,7 @@ def test_the_robust_optimum_prefers_what_is_safe_on_every_plausible_model() -> N
     """The merit is the mean error where nothing is unsafe, and worse by what is."""
     models = np.array([TWIN, HEAVY])
     gains = np.array([[1500.0, 1000, 170], [283, 13, 82], [4000, 1073, 0]])
-    merits = merit(TAKEOFF, gains, models, until_s=32.0)
+    merits = TAKEOFF.merits(gains, models, until_s=32.0)
     errors = np.array([TAKEOFF.errors(TAKEOFF.outputs(gains, model)) for model in models]).mean(axis=0)
     assert merits[0] == pytest.approx(errors[0], abs=0.002)
     assert merits[1] > errors[1] + 0.1

@@ -14,9 +14,9 @@ from app.core.control.vertical_guidance import (
     step,
     wrap32,
 )
-from app.core.experiments import vertical_loop_hazards
+from app.core.experiments import integer_overflow
 from app.core.experiments.base import Check
-from app.core.experiments.vertical_loop_hazards import PRODUCTS, check_wrapping
+from app.core.experiments.integer_overflow import PRODUCTS, check_wrapping
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 
 TARGET = 768
@@ -91,6 +91,6 @@ def test_each_gain_that_can_wrap_is_refused_with_the_nearest_that_cannot() -> No
 
 def test_uncompiled_a_short_start_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """kp of 20 000 000 wraps within the first second, stuck on the ground."""
-    monkeypatch.setattr(vertical_loop_hazards, "LONGEST_S", 0.6)
+    monkeypatch.setattr(integer_overflow, "LONGEST_S", 0.6)
     (refused,) = checked(20_000_000, 0, 0)
     assert refused.case.startswith("stuck on the ground, 0.36 s")
