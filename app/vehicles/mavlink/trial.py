@@ -107,8 +107,7 @@ class TrialRunner:
 
     def _note_sinking(self) -> None:
         """Note since when the vehicle has not descended by `SINKS_M`."""
-        trial, last = self.trial, self.trial.watch.last
-        altitude_m = float("inf") if last is None else last.altitude_m
+        trial, altitude_m = self.trial, self.trial.watch.last.altitude_m
         if trial.state not in LANDING or altitude_m < self._sank_to_m - SINKS_M:
             self._sank_s, self._sank_to_m = self._radio.clock.now_s(), altitude_m
 
@@ -225,9 +224,9 @@ class TrialRunner:
 
     def _place(self, action: Action) -> Target:
         """Return the target of set points at the place where the vehicle hovers when it begins to hold the first."""
-        last = self.trial.watch.last
-        if action is not Action.HOLD or last is None:
+        if action is not Action.HOLD:
             return self._target
+        last = self.trial.watch.last
         return replace(self._target, north_m=last.north_m, east_m=last.east_m)
 
     def _keep_streaming(self) -> float:
