@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.dialects import COMMON, Message, is_known, number
@@ -37,9 +36,7 @@ def _vision(message: Message) -> Pose:
     return Pose(number(message, "usec") / 1e6, -values[2], values, tracking_valid=True)
 
 
-READERS: Final[Mapping[str, Callable[[Message], Pose]]] = MappingProxyType(
-    {"ODOMETRY": _odometry, "VISION_POSITION_ESTIMATE": _vision}
-)
+READERS: Final[Mapping[str, Callable[[Message], Pose]]] = {"ODOMETRY": _odometry, "VISION_POSITION_ESTIMATE": _vision}
 
 
 class OdometrySource(AltitudeSource):
