@@ -96,18 +96,16 @@ class NatNetSource(AltitudeSource):
         while self.newest is None and time.monotonic() < until_s:
             self._process_data()
             time.sleep(POLL_S)
-        if self.newest is None:
-            raise self._absent()
-
-    def _absent(self) -> VehicleError:
+        if self.newest is not None:
+            return
         if self._frame_s is None:
-            return VehicleError(
+            raise VehicleError(
                 f"The motion capture at {self._address.host} answers, but sent no frames within {SEEN_WITHIN_S:g} s.",
                 hint="Check that Motive streams live, to the multicast group (or unicast) and over the interface that "
                 "the address names: &multicast=GROUP or no, &local=ADDRESS of this computer.",
             )
         streamed = ", ".join(map(str, sorted(self._streamed_bodies))) or "none"
-        return VehicleError(
+        raise VehicleError(
             f"The motion capture at {self._address.host} streams no rigid body {self._address.body}; it streams these "
             f"ids: {streamed}.",
             hint="Use the streaming id that Motive shows with the body, as ?body=ID, and check that it is enabled.",
