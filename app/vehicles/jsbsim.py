@@ -189,7 +189,6 @@ JSBSIM: Final = VehicleKind(
     title="Simulated AR.Drone 2",
     line="Six degrees of freedom in JSBSim under the autopilot's own vertical loop, as the paper's Table 1 was flown.",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
         Option("thrust_scale", "Thrust, as a multiple of the airframe's", 1.0, "×", 0.7, 1.5),

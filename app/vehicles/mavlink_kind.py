@@ -171,7 +171,6 @@ MAVLINK: Final = VehicleKind(
     line=f"A real vehicle with {_choice(each.title for each in AUTOPILOTS.values())}, or a simulated one with the same "
     "protocol.",
     is_real=True,
-    can_fly=True,
     experiments=tuple(dict.fromkeys(each.name for autopilot in AUTOPILOTS.values() for each in autopilot.experiments)),
     options=(
         Option("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", _DEFAULT.name, label="Kind of autopilot"),

@@ -99,7 +99,6 @@ TWIN: Final = VehicleKind(
     title="Twin of the paper's AR.Drone 2",
     line="A simple vertical model fitted to the published errors of the paper's real flights and to their scatter.",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
         Option("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", 1.0, "×", 0.0, 5.0),

@@ -38,7 +38,6 @@ STUBBORN = VehicleKind(
     title="Stubborn",
     line="",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff",),
     options=(),
     open=opened_stubborn,
