@@ -75,6 +75,10 @@ class Counting:
     def remote(self) -> Peer | None:
         return self._transport.remote
 
+    @remote.setter
+    def remote(self, peer: Peer | None) -> None:
+        self._transport.remote = peer
+
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         return self._transport.read(timeout_s)
 
@@ -82,9 +86,6 @@ class Counting:
         self.packets += 1
         self.sent_ms += stamps(self._codec.parse(data))
         return self._transport.write(data)
-
-    def adopt(self, peer: Peer) -> None:
-        self._transport.adopt(peer)
 
     def wake(self) -> None:
         self._transport.wake()

@@ -268,7 +268,7 @@ class Link:
         vehicle's first packet."""
         messages = self._new_codec().parse(data)
         if any(self._is_vehicle(message) for message in messages):
-            self._transport.adopt(peer)
+            self._transport.remote = peer
             self._queue(messages)
         else:
             self._health.foreign += 1
@@ -280,7 +280,7 @@ class Link:
         is_gone = now_s - since_s > GONE_AFTER_S
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
-                self._transport.adopt(peer)
+                self._transport.remote = peer
         elif not is_gone and self._health.last_packet_s is not None and self._others.may_check(peer, now_s):
             message = next((each for each in self._new_codec().parse(data) if self._poses_as_vehicle(each)), None)
             if message is None:
@@ -291,7 +291,7 @@ class Link:
             if verdict == "duplicate":
                 self._duplicate_s = now_s
             elif verdict == "moved" and is_same_host:
-                self._transport.adopt(peer)
+                self._transport.remote = peer
 
     def _poses_as_vehicle(self, message: Message) -> bool:
         """Whether a message of another peer has the vehicle's ids, and is no copy of one of its own."""

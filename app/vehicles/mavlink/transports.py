@@ -47,9 +47,8 @@ class LinkError(VehicleError):
 class Transport(Protocol):
     """Transport to and from one peer. One thread reads and closes; any thread may `write` and `wake` until then."""
 
-    @property
-    def remote(self) -> Peer | None:
-        """Peer that `write` sends to; None until it is known (`adopt`)."""
+    remote: Peer | None
+    """Peer that `write` sends to; None until it is known and set."""
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         """Return the data received, each a datagram or a piece of a stream, with its sender: over UDP anybody can send.
@@ -57,9 +56,6 @@ class Transport(Protocol):
 
     def write(self, data: bytes) -> bool:
         """Send without waiting; return false without a peer or connection, or if the buffer is full."""
-
-    def adopt(self, peer: Peer) -> None:
-        """Send to `peer` from now on."""
 
     def wake(self) -> None:
         """Make a `read` of another thread return at once."""
@@ -116,9 +112,6 @@ class UdpTransport:
             return False
         return True
 
-    def adopt(self, peer: Peer) -> None:
-        self.remote = peer
-
     def wake(self) -> None:
         self._waiter.wake()
 
@@ -136,8 +129,8 @@ class StreamTransport:
 
     def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
         """Open the stream by `opened`, which raises OSError on failure. Raises LinkError if that fails now."""
-        self.remote: Final = peer
-        self._opened = opened
+        self.remote: Peer | None = peer
+        self._opened, self._peer = opened, peer
         try:
             self._stream: _Stream | None = opened()
         except OSError as error:
@@ -161,7 +154,7 @@ class StreamTransport:
             with self._writing:
                 self._flush(self._stream)
         data = self._receive(self._stream) if is_readable else b""
-        return [(data, self.remote)] if data else []
+        return [(data, self._peer)] if data else []
 
     def write(self, data: bytes) -> bool:
         with self._writing:
@@ -172,9 +165,6 @@ class StreamTransport:
             if self._backlog or self._is_broken:
                 self._waiter.wake()
             return not self._is_broken
-
-    def adopt(self, peer: Peer) -> None:
-        """Do nothing: there is only one peer."""
 
     def wake(self) -> None:
         self._waiter.wake()

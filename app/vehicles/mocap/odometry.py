@@ -123,7 +123,7 @@ class StreamSource(OdometrySource):
         codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT) if is_unknown else self._codec
         messages = [message for message in codec.parse(data) if is_known(message)]
         if is_unknown and any(message.get_type() in READERS for message in messages):
-            self._transport.adopt(peer)
+            self._transport.remote = peer
         now_s = self._clock.now_s()
         for message in messages:
             super().on_message(Received(message, now_s))

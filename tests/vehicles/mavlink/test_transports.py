@@ -78,7 +78,7 @@ def test_at_our_own_address_nobody_is_written_to_until_one_is_adopted(vehicle: s
         stranger.sendto(b"one", (LOOPBACK, local))
         vehicle.sendto(b"two", (LOOPBACK, local))
         assert hear(transport, 6) == b"onetwo"
-        transport.adopt(vehicle.getsockname())
+        transport.remote = vehicle.getsockname()
         stranger.sendto(b"three", (LOOPBACK, local))
         vehicle.sendto(b"four", (LOOPBACK, local))
         assert hear(transport, 9) == b"threefour"
