@@ -17,14 +17,7 @@ from typing import Final, Protocol
 import serial
 
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.addresses import (
-    Address,
-    SerialAddress,
-    TcpAddress,
-    UdpAddress,
-    UdpInAddress,
-    is_loopback_host,
-)
+from app.vehicles.mavlink.addresses import Address, is_loopback_host
 
 Peer = tuple[str, int]
 """Sender of data: host and port, or device and baud rate."""
@@ -65,16 +58,17 @@ class Transport(Protocol):
 
 def open_transport(address: Address) -> Transport:
     """Open the transport of an address. Raises LinkError if it cannot be opened."""
-    match address:
-        case UdpAddress(host, port, local_port):
-            ours = ("127.0.0.1" if is_loopback_host(host) else "0.0.0.0", local_port or 0)  # noqa: S104
-            return UdpTransport(ours, _resolved(address, host, port))
-        case UdpInAddress(host, port):
-            return UdpTransport(_resolved(address, host, port), None)
-        case TcpAddress(host, port):
-            return StreamTransport((host, port), lambda: _connected(host, port))
-        case SerialAddress(device, baud):
-            return StreamTransport((device, baud), lambda: _serial_port(device, baud))
+    place, number = address.place, address.number
+    match address.kind:
+        case "udp":
+            ours = ("127.0.0.1" if is_loopback_host(place) else "0.0.0.0", address.local_port or 0)  # noqa: S104
+            return UdpTransport(ours, _resolved(address))
+        case "udpin":
+            return UdpTransport(_resolved(address), None)
+        case "tcp":
+            return StreamTransport((place, number), lambda: _connected(place, number))
+        case "serial":
+            return StreamTransport((place, number), lambda: _serial_port(place, number))
 
 
 class UdpTransport:
@@ -261,12 +255,12 @@ def _serial_port(device: str, baud: int) -> serial.Serial:
         raise OSError(str(error)) from error
 
 
-def _resolved(address: Address, host: str, port: int) -> Peer:
+def _resolved(address: Address) -> Peer:
     try:
-        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+        found = socket.getaddrinfo(address.place, address.number, socket.AF_INET, socket.SOCK_DGRAM)
     except OSError as error:
         raise _cannot_open(str(address), error) from error
-    return str(found[0][4][0]), port
+    return str(found[0][4][0]), address.number
 
 
 def _cannot_open(what: str, error: OSError) -> LinkError:

@@ -26,7 +26,7 @@ from app.autopilots.dialects import (
 )
 from app.core.clock import ScaledClock
 from app.core.errors import InputError
-from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.link import (
     MAX_QUEUED_MESSAGES,
     UNATTENDED_AFTER_S,
@@ -586,7 +586,7 @@ def test_a_link_over_tcp_outlives_the_connection() -> None:
     with (
         socket.create_server((LOOPBACK, 0)) as server,
         FakeVehicleEndpoint(COMMON, system=1) as vehicle,
-        closing(Link(TcpAddress(LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK)) as link,
+        closing(Link(Address("tcp", LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK)) as link,
     ):
         server.settimeout(Waits.at_most_s)
         for _ in range(2):
@@ -607,7 +607,7 @@ def test_a_link_over_a_serial_line() -> None:
     tty.setraw(our_end)
     with (
         FakeVehicleEndpoint(ARDUPILOTMEGA, system=1) as vehicle,
-        closing(Link(SerialAddress(os.ttyname(our_end), 57600), ARDUPILOTMEGA, clock=CLOCK)) as link,
+        closing(Link(Address("serial", os.ttyname(our_end), 57600), ARDUPILOTMEGA, clock=CLOCK)) as link,
     ):
         os.write(vehicle_end, b"\x00\x55" + heartbeat(vehicle))
         assert [each.message.get_srcSystem() for each in collect(link, 1)] == [1]
