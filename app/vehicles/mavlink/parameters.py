@@ -167,15 +167,11 @@ class GainStore:
         """Read the gains. Raises VehicleError if the vehicle does not reply."""
         return dict(self._note(self._radio.seen.restarts, read_gains(self._radio, self._gain_set, self.wanted)))
 
-    def restore(self) -> dict[str, float]:
-        """Write the safe gains and return those read back. Raises VehicleError if the vehicle does not reply."""
+    def restore(self) -> str:
+        """Write the safe gains and read them back; return why they cannot be verified, or an empty string."""
         self.staged = None
-        return dict(self._write(self.safe))
-
-    def restore_or_explain(self) -> str:
-        """Restore the safe gains; return why they cannot be verified, or an empty string."""
         try:
-            held = self.restore()
+            held = self._write(self.safe)
         except VehicleError as error:
             return str(error)
         mismatch = find_mismatch(held, self.safe)
