@@ -6,7 +6,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from app.autopilots.commands import Action, Outgoing, Target, read_parameter
+from app.autopilots.commands import Action, Outgoing, read_parameter
 from app.autopilots.measurements import Position
 from app.vehicles.base import Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import Requester, StopRequest
@@ -209,20 +209,18 @@ class TrialRunner:
     def _perform(self, command: PerformAction) -> None:
         action, (profile, target) = command.action, (self._radio.profile, self._radio.target)
         if command.altitude_m is not None:
+            if (
+                action is Action.HOLD
+            ):  # set points are flown at the place where it hovers as it begins to hold the first
+                last = self.trial.watch.last
+                self._target = replace(self._target, north_m=last.north_m, east_m=last.east_m)
             target = self._target = replace(
-                self._place(action), altitude_m=command.altitude_m, acceleration_m_s2=command.acceleration_m_s2
+                self._target, altitude_m=command.altitude_m, acceleration_m_s2=command.acceleration_m_s2
             )
             if not self._stream:
                 self._streamed_s = self._radio.clock.now_s()
             self._stream = profile.stream(target)
         self._sequence = CommandSequence(action, profile.steps(action, target), self._radio)
-
-    def _place(self, action: Action) -> Target:
-        """Return the target of set points at the place where the vehicle hovers when it begins to hold the first."""
-        if action is not Action.HOLD:
-            return self._target
-        last = self.trial.watch.last
-        return replace(self._target, north_m=last.north_m, east_m=last.east_m)
 
     def _keep_streaming(self) -> float:
         """Send the set point again, if it is due: some autopilots leave the mode, and land, without a stream. Return
