@@ -122,9 +122,8 @@ class PositionMonitor:
     # ---- findings
 
     def find_glitches(self) -> Finding | None:
-        if self.glitches <= _MAX_GLITCHES:
-            return None
-        return Finding(Failure.GLITCHES, f"{self.glitches} samples were dropped.")
+        why = f"{self.glitches} samples were dropped."
+        return Finding(Failure.GLITCHES, why) if self.glitches > _MAX_GLITCHES else None
 
     def find_frozen(self) -> Finding | None:
         why = f"Its altitude stood still for more than {_UNCHANGED_S:g} s while its clock ran."
@@ -133,9 +132,8 @@ class PositionMonitor:
     def find_implausible(self, plan: Plan, received_s: float, now_s: float) -> Finding | None:
         """Find that none is plausible; to be called after a lost link was looked for, because silence is one."""
         lost_s = LOST_S * plan.timeout_factor
-        if min(now_s, received_s) - self.accepted_s <= lost_s:
-            return None
-        return Finding(Failure.LOST_POSITION, f"None of its positions was plausible for {lost_s:g} s.")
+        why = f"None of its positions was plausible for {lost_s:g} s."
+        return Finding(Failure.LOST_POSITION, why) if min(now_s, received_s) - self.accepted_s > lost_s else None
 
     def find_unreliable(self) -> Finding | None:
         why = "Its position jumps back and forth."
@@ -143,9 +141,8 @@ class PositionMonitor:
 
     def find_jump(self) -> Finding | None:
         """Find a jump of the altitude in flight: it, or the earlier altitude, is not the vehicle's."""
-        if self.jumped_m <= _JUMP_ENDS_RECORD_M:
-            return None
-        return Finding(Failure.LOST_POSITION, f"Its altitude jumped by {self.jumped_m:.1f} m.")
+        why = f"Its altitude jumped by {self.jumped_m:.1f} m."
+        return Finding(Failure.LOST_POSITION, why) if self.jumped_m > _JUMP_ENDS_RECORD_M else None
 
     def find_departure(self, ground_m: float, *, stands: bool) -> Finding | None:
         """Find that a vehicle without a takeoff command may have left the ground, by its altitude, or that its altitude
@@ -246,6 +243,5 @@ class SecondSourceMonitor:
         """Find a disagreement between the vehicle's altitude on the ground and the source's last one before a shift."""
         second_m = self.altitude_at(now_s)
         apart_m = 0.0 if second_m is None else abs(second_m + ground_shift_m - altitude_m)
-        if apart_m <= MAX_DIFFERENCE_M:
-            return None
-        return Finding(Failure.DISAGREEMENT, f"They were {apart_m:.2f} m apart before the takeoff command.")
+        why = f"They were {apart_m:.2f} m apart before the takeoff command."
+        return Finding(Failure.DISAGREEMENT, why) if apart_m > MAX_DIFFERENCE_M else None

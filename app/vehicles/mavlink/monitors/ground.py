@@ -124,13 +124,11 @@ class ClimbMonitor:
     def find_incomplete(self, climb_to_m: float) -> Finding | None:
         """Find at the end of a record that the vehicle has never been near its first set point. Its gains may have kept
         it low, or a change of mode that no heartbeat reported."""
-        if self.has_been_near(climb_to_m):
-            return None
         why = (
             f"It did not come within {_WITHIN_M:g} m of its set point, because of its gains or of a change of mode "
             "that no heartbeat reported."
         )
-        return Finding(Failure.INTERRUPTED, why)
+        return None if self.has_been_near(climb_to_m) else Finding(Failure.INTERRUPTED, why)
 
     def find_sunken(self, last: Position, lowest_m: float, ground_m: float) -> Finding | None:
         """Find at the end of a record that the vehicle, or its altitude alone, has sunk to less than half of the lowest

@@ -83,10 +83,8 @@ class EnvelopeMonitor:
         return Finding(Failure.ENVELOPE, why) if why else self.find_oscillation()
 
     def find_oscillation(self) -> Finding | None:
-        if self.leaning <= _LEANING:
-            return None
         why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
-        return Finding(Failure.ENVELOPE, why)
+        return Finding(Failure.ENVELOPE, why) if self.leaning > _LEANING else None
 
 
 @dataclass(frozen=True, kw_only=True)
