@@ -32,7 +32,7 @@ import numpy as np
 
 from app.autopilots.dialects import PAPARAZZI, FieldValue, Message, number
 from app.core.clock import ScaledClock
-from app.vehicles.mavlink.addresses import UdpAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.link import Link
 
 LIMIT_S: Final = 0.05
@@ -55,7 +55,7 @@ Arrivals = dict[int, int]
 class Vehicle:
     """The streaming process: its address, and the pipe that ends it."""
 
-    address: UdpAddress
+    address: Address
     pipe: Connection
 
     def begin(self) -> None:
@@ -114,7 +114,7 @@ def vehicle(rate_hz: float) -> Iterator[Vehicle]:
     process.start()
     port = ours.recv()
     ours.send(local)
-    yield Vehicle(UdpAddress(LOOPBACK, port, local), ours)
+    yield Vehicle(Address("udp", LOOPBACK, port, local), ours)
     process.join()
 
 

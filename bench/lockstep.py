@@ -23,7 +23,8 @@ class Lockstep:
     def __init__(self, drone: Drone) -> None:
         self.drone: Final = drone
         self.muted = False
-        self.peer = self.remote = PEER
+        self.peer = PEER
+        self.remote: Peer | None = PEER
         self._frames: deque[tuple[bytes, Peer]] = deque()
 
     # ---- the clock of both sides
@@ -53,9 +54,6 @@ class Lockstep:
         if self.remote == self.peer:
             self.drone.receive(data)
         return True
-
-    def adopt(self, peer: Peer) -> None:
-        self.remote = peer
 
     def wake(self) -> None:
         """Do nothing: no thread waits."""

@@ -31,7 +31,7 @@ from app.core.clock import ScaledClock
 from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
-from app.vehicles.mavlink.addresses import UdpAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.preparation import GroundObservation
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialRunner
@@ -75,6 +75,10 @@ class Counting:
     def remote(self) -> Peer | None:
         return self._transport.remote
 
+    @remote.setter
+    def remote(self, peer: Peer | None) -> None:
+        self._transport.remote = peer
+
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         return self._transport.read(timeout_s)
 
@@ -82,9 +86,6 @@ class Counting:
         self.packets += 1
         self.sent_ms += stamps(self._codec.parse(data))
         return self._transport.write(data)
-
-    def adopt(self, peer: Peer) -> None:
-        self._transport.adopt(peer)
 
     def wake(self) -> None:
         self._transport.wake()
@@ -98,7 +99,7 @@ def stamps(messages: list[Message]) -> list[int]:
     return [int(number(message, "time_boot_ms")) for message in messages if message.get_type() == POSITION]
 
 
-def be_vehicle(pipe: Connection, autopilot: str, address: UdpAddress) -> None:
+def be_vehicle(pipe: Connection, autopilot: str, address: Address) -> None:
     """Run the drone until the pipe ends it, then report what it sent; the main function of a process."""
     kind = get_autopilot(autopilot)
     transport = Counting(open_transport(address), autopilot)
@@ -187,7 +188,7 @@ def logged(folder: Path, autopilot: str) -> Counter[int]:
 
 
 @contextmanager
-def vehicle_process(autopilot: str, address: UdpAddress) -> Iterator[Connection]:
+def vehicle_process(autopilot: str, address: Address) -> Iterator[Connection]:
     """Run the drone in another process and yield it ready to fly."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
@@ -207,8 +208,8 @@ def measure(autopilot: str, seconds: float) -> bool:
     here, there = free_port(), free_port()
     meter = Meter(seconds)
     chosen: dict[str, OptionValue] = {"autopilot": autopilot, "simulated": True}
-    address = str(UdpAddress(LOOPBACK, there, here))
-    with tempfile.TemporaryDirectory() as folder, vehicle_process(autopilot, UdpAddress(LOOPBACK, here, there)) as pipe:
+    address, ground = str(Address("udp", LOOPBACK, there, here)), Address("udp", LOOPBACK, here, there)
+    with tempfile.TemporaryDirectory() as folder, vehicle_process(autopilot, ground) as pipe:
         options = MAVLINK.check({**chosen, "address": address, "log_folder": folder}, field="options")
         before, (record, kept), after = slowness(), fly(autopilot, options, meter), slowness()
         in_log = logged(Path(folder), autopilot)

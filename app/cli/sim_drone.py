@@ -12,7 +12,7 @@ from app.core.clock import ScaledClock
 from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server, parse_fault
 from app.simdrone.motion_capture import open_outlet
-from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
+from app.vehicles.mavlink.addresses import Address, is_loopback, parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress
 from app.vehicles.mocap.addresses import parse as parse_source
@@ -70,7 +70,7 @@ def _mocap_address(source: SourceAddress | None) -> Address | None:
         case StreamAddress(link):
             return link
         case NatNetAddress():
-            return UdpInAddress(source.host, source.command_port)
+            return Address("udpin", source.host, source.command_port)
         case _:
             return None
 

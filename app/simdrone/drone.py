@@ -176,7 +176,7 @@ class Server:
         """Receive from the link; very short waits are rounded up."""
         for data, peer in self._transport.read(max(wait_s, _SHORTEST_WAIT_S) if wait_s > 0.0 else 0.0):
             if self._transport.remote is None:
-                self._transport.adopt(peer)
+                self._transport.remote = peer
             if peer == self._transport.remote:
                 self._drone.receive(data)
 

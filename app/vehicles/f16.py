@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -26,9 +25,9 @@ from app.core.models.f16 import (
 )
 from app.core.policy import Gains, is_finite, shortened
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.base import FlightOptions, OptionValue, Sample, ShouldStop, Vehicle
+from app.vehicles.base import FlightOptions, OptionValue, Sample, ShouldStop
 from app.vehicles.flight_end import StopRequest
-from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.kinds import VehicleKind
 from app.vehicles.simulated import CANNOT_HOLD, Pacer, StagedVehicle
 
 GAIN_NAMES: Final = PitchTracking.space.names
@@ -127,16 +126,11 @@ def _refusal(value: float) -> str | None:
     return None
 
 
-def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
-    return LinearAircraft(safe_gains, options)
-
-
 LTI: Final = VehicleKind(
     name="lti",
     title="F-16, longitudinal",
     line="The linear F-16 at 15 000 ft and 500 ft/s that serves as the true system in the paper's first experiment.",
     is_real=False,
-    can_fly=True,
     experiments=("pitch-tracking",),
     options=(
         Option(
@@ -148,5 +142,5 @@ LTI: Final = VehicleKind(
             10.0,
         ),
     ),
-    open=_open,
+    open=lambda options, safe_gains, _trial_parameters: LinearAircraft(safe_gains, options),
 )

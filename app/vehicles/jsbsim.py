@@ -14,12 +14,11 @@ import numpy as np
 from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.definition import Option
 from app.core.errors import Problem
-from app.core.formatting import percent
 from app.core.models.vertical import GRAVITY_M_S2
 from app.vehicles.base import VehicleError
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, COMMAND_SIZE, Integers, Rows, control
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
+from app.vehicles.simulated import MAX_STEPS, gusts, opener, refuse_hover, streams
 
 if TYPE_CHECKING:
     import jsbsim
@@ -173,15 +172,8 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
     """
     strength = float(options["thrust_scale"]) * (1.0 - float(options["battery_sag"])) ** 2
     share = float(options["mass_kg"]) * GRAVITY_M_S2 / (FULL_THRUST_N * strength)
-    if share <= HIGHEST_HOVER:
-        return ()
-    return (
-        Problem(
-            "mass_kg",
-            f"is too much for these motors and this battery: hovering needs {percent(share)} of full thrust, and "
-            f"control is possible up to {percent(HIGHEST_HOVER)}",
-        ),
-    )
+    reason = "is too much for these motors and this battery: hovering needs {} of full thrust"
+    return refuse_hover("mass_kg", share, reason)
 
 
 JSBSIM: Final = VehicleKind(
@@ -189,7 +181,6 @@ JSBSIM: Final = VehicleKind(
     title="Simulated AR.Drone 2",
     line="Six degrees of freedom in JSBSim under the autopilot's own vertical loop, as the paper's Table 1 was flown.",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
         Option("thrust_scale", "Thrust, as a multiple of the airframe's", 1.0, "×", 0.7, 1.5),

@@ -46,7 +46,6 @@ class VehicleKind:
     title: str
     line: str
     is_real: bool
-    can_fly: bool
     experiments: tuple[str, ...]
     options: tuple[Option, ...]
     open: Callable[[Options, Gains, Path | None], Vehicle]
@@ -56,6 +55,7 @@ class VehicleKind:
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None
     check_gains: Callable[[Options, Gains], object] = lambda _options, _gains: None
     longest_window_s: Callable[[Options], float] = lambda _options: math.inf
+    can_fly: bool = True
     altitude_limit_m: float | None = None
     highest_set_point_m: float = math.inf
 

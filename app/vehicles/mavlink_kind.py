@@ -15,7 +15,6 @@ from app.core.policy import Gains
 from app.vehicles.base import ALTITUDE_LIMIT_M, HIGHEST_SET_POINT_M, LAND_COMMAND_S, RECORDED_BEYOND_S, Identity
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
-from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mocap import addresses as sources
 
 if TYPE_CHECKING:
@@ -49,9 +48,7 @@ def is_simulated(options: Options, simulation_hosts: Hosts = HERE) -> bool:
 
 
 def _may_simulate(address: addresses.Address, simulation_hosts: Hosts) -> bool:
-    return addresses.is_loopback(address) or (
-        not isinstance(address, addresses.SerialAddress) and address.host in simulation_hosts
-    )
+    return addresses.is_loopback(address) or (address.kind != "serial" and address.place in simulation_hosts)
 
 
 def _open(
@@ -121,7 +118,7 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
         problems.append(Problem("autopilot", f"must be {', '.join(AUTOPILOTS)}, got {options['autopilot']}"))
     try:
         address = addresses.parse(str(options["address"]))
-        if autopilot and autopilot.sends_to_port and isinstance(address, UdpAddress) and address.local_port is None:
+        if autopilot and autopilot.sends_to_port and address.kind == "udp" and address.local_port is None:
             usual = autopilot.address.rpartition("@")[2]
             problems.append(
                 Problem(
@@ -171,7 +168,6 @@ MAVLINK: Final = VehicleKind(
     line=f"A real vehicle with {_choice(each.title for each in AUTOPILOTS.values())}, or a simulated one with the same "
     "protocol.",
     is_real=True,
-    can_fly=True,
     experiments=tuple(dict.fromkeys(each.name for autopilot in AUTOPILOTS.values() for each in autopilot.experiments)),
     options=(
         Option("autopilot", f"Autopilot: {_choice(AUTOPILOTS)}", _DEFAULT.name, label="Kind of autopilot"),

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, NoReturn
 
 from app.autopilots.registry import AUTOPILOTS
@@ -38,9 +37,7 @@ IMPORT: Final = VehicleKind(
 )
 
 
-VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
-    {kind.name: kind for kind in (JSBSIM, TWIN, LTI, MAVLINK, IMPORT)}
-)
+VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = {kind.name: kind for kind in (JSBSIM, TWIN, LTI, MAVLINK, IMPORT)}
 
 
 def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:

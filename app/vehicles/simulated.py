@@ -26,6 +26,7 @@ from app.core.control.vertical_guidance import (
 )
 from app.core.errors import InputError, Problem
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
+from app.core.formatting import percent
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, shortened
 from app.core.records.trajectory import Trajectory
@@ -123,6 +124,10 @@ class Simulation(Protocol):
         (steps, 8), with the measurements at the beginning of the step and the resulting thrust."""
 
 
+Launch = Callable[[dict[str, float], int], Simulation]
+"""Begins a flight of a vehicle with its options and a seed."""
+
+
 class StagedVehicle(ABC):
     """A simulated vehicle that starts every flight anew, with its gains between the flights; `accept` completes and
     checks them, `settings` describe the vehicle in its records."""
@@ -197,25 +202,19 @@ class StagedVehicle(ABC):
 class SimulatedVehicle(StagedVehicle):
     """Simulated vehicle that holds the loop's three integer gains and starts every flight from rest on the ground.
 
-    `launch(order)` returns the simulation of one flight. A stop ends the flight there: the safe gains are set and the
-    vehicle descends at 0.5 m/s. The record includes the descent, whose set point is the ground; one that never rose
-    above `_LANDED_M` has not flown.
+    A stop ends the flight there: the safe gains are set and the vehicle descends at 0.5 m/s. The record includes the
+    descent, whose set point is the ground; one that never rose above `_LANDED_M` has not flown.
     """
 
-    def __init__(
-        self,
-        kind: str,
-        safe_gains: Gains,
-        settings: Mapping[str, OptionValue],
-        launch: Callable[[FlightOptions], Simulation],
-    ) -> None:
+    def __init__(self, kind: str, safe_gains: Gains, settings: Options, launch: Launch) -> None:
         super().__init__(kind, safe_gains, settings, _counts)
         self._launch = launch
 
     def _flown(
         self, order: FlightOptions, on_sample: Callable[[Sample], None], should_stop: ShouldStop
     ) -> tuple[Trajectory, StopRequest | None, bool]:
-        simulation = self._launch(order)
+        numbers = {name: float(value) for name, value in self._settings.items()}
+        simulation = self._launch(numbers, order.seed)
         rows: list[Rows] = []
         stop = self._take_off(simulation, rows, order, on_sample, should_stop)
         self._restore()
@@ -255,16 +254,18 @@ class SimulatedVehicle(StagedVehicle):
             yield last
 
 
-def opener(
-    kind: str, launch: Callable[[dict[str, float], int], Simulation]
-) -> Callable[[Options, Gains, Path | None], SimulatedVehicle]:
-    """The function that opens a vehicle of this kind; `launch` begins a flight with its options and a seed."""
+def opener(kind: str, launch: Launch) -> Callable[[Options, Gains, Path | None], SimulatedVehicle]:
+    """The function that opens a vehicle of this kind."""
+    return lambda options, safe_gains, _trial_parameters: SimulatedVehicle(kind, safe_gains, options, launch)
 
-    def open_vehicle(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> SimulatedVehicle:
-        numbers = {name: float(value) for name, value in options.items()}
-        return SimulatedVehicle(kind, safe_gains, options, lambda order: launch(numbers, order.seed))
 
-    return open_vehicle
+def refuse_hover(option: str, share: float, reason: str) -> tuple[Problem, ...]:
+    """Refuse an option with which hovering needs more than `HIGHEST_HOVER`; `reason` has a place for the `share` that
+    it needs."""
+    if share <= HIGHEST_HOVER:
+        return ()
+    limit = f"and control is possible up to {percent(HIGHEST_HOVER)}"
+    return (Problem(option, f"{reason.format(percent(share))}, {limit}"),)
 
 
 def simulate_flight(

@@ -15,10 +15,9 @@ from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.definition import Option
 from app.core.errors import Problem
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS
-from app.core.formatting import percent
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, PAST, Integers, Rows, fly_simple_model
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import FLIGHT_S, HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
+from app.vehicles.simulated import FLIGHT_S, MAX_STEPS, gusts, opener, refuse_hover, streams
 
 _THRUST_SD: Final = 0.003
 _START_SD_S: Final = 0.060
@@ -83,14 +82,8 @@ def _hover_force(options: Options) -> float:
 
 def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
     share = _hover_force(options) / (1.0 - float(options["battery_sag"]))
-    if share <= HIGHEST_HOVER:
-        return ()
-    return (
-        Problem(
-            "battery_sag",
-            f"leaves too little thrust: at the end of a flight, hovering needs {percent(share)} of it, and control is "
-            f"possible up to {percent(HIGHEST_HOVER)}",
-        ),
+    return refuse_hover(
+        "battery_sag", share, "leaves too little thrust: at the end of a flight, hovering needs {} of it"
     )
 
 
@@ -99,7 +92,6 @@ TWIN: Final = VehicleKind(
     title="Twin of the paper's AR.Drone 2",
     line="A simple vertical model fitted to the published errors of the paper's real flights and to their scatter.",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
         Option("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", 1.0, "×", 0.0, 5.0),

@@ -23,7 +23,7 @@ from app.campaigns.campaign_files import read_preset
 from app.cli.commands import app
 from app.core.clock import ScaledClock
 from app.vehicles.base import Identity
-from app.vehicles.mavlink.addresses import UdpAddress, parse
+from app.vehicles.mavlink.addresses import Address, parse
 from app.vehicles.mavlink.link import Link
 from tests.ports import free_port
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -61,8 +61,8 @@ def said(stream: IO[str] | None, words: str) -> None:
 @contextmanager
 def drone(autopilot: str) -> Iterator[str]:
     """A simulated one; gives the address at which a ground station reaches it."""
-    address = UdpAddress(LOOPBACK, free_port(), free_port())
-    link = f"udp:{LOOPBACK}:{address.local_port}@{address.port}"
+    address = Address("udp", LOOPBACK, free_port(), free_port())
+    link = f"udp:{LOOPBACK}:{address.local_port}@{address.number}"
     body = ("--vehicle", "twin", "--speed", str(SPEED))
     command = [str(GAINLINE), "sim-drone", "--autopilot", autopilot, "--link", link, *body]
     with subprocess.Popen(

@@ -14,6 +14,10 @@ from app.vehicles.simulated import SimulatedVehicle, Simulation
 from tests.vehicles.flying import SAFE, TUNED
 
 
+def does_not_fly(_options: object, _seed: int) -> Simulation:
+    raise VehicleError("It does not fly.", hint="It is a test.")
+
+
 class StubbornVehicle(SimulatedVehicle):
     """A vehicle that takes experimental gains and then keeps them."""
 
@@ -27,10 +31,7 @@ class StubbornVehicle(SimulatedVehicle):
 
 
 def opened_stubborn(_options: Options, safe_gains: Gains, _folder: Path | None) -> Vehicle:
-    def launch(_order: object) -> Simulation:
-        raise VehicleError("It does not fly.", hint="It is a test.")
-
-    return StubbornVehicle("stubborn", safe_gains, {}, launch)
+    return StubbornVehicle("stubborn", safe_gains, {}, does_not_fly)
 
 
 STUBBORN = VehicleKind(
@@ -38,7 +39,6 @@ STUBBORN = VehicleKind(
     title="Stubborn",
     line="",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff",),
     options=(),
     open=opened_stubborn,
@@ -121,10 +121,7 @@ class DeafVehicle(SimulatedVehicle):
 
 
 def opened_deaf(_options: Options, safe_gains: Gains, _folder: Path | None) -> Vehicle:
-    def launch(_order: object) -> Simulation:
-        raise VehicleError("It does not fly.", hint="It is a test.")
-
-    return DeafVehicle("deaf", safe_gains, {}, launch)
+    return DeafVehicle("deaf", safe_gains, {}, does_not_fly)
 
 
 def test_safe_gains_that_cannot_even_be_sent_are_reported_as_loudly(monkeypatch: pytest.MonkeyPatch) -> None:

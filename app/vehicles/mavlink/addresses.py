@@ -1,14 +1,14 @@
 """Addresses of vehicles, written as one text.
 
 udp:HOST:PORT[@LOCALPORT]  send to the vehicle there, from LOCALPORT (Paparazzi sends to a port fixed in its firmware)
-udpin:HOST:PORT            wait at our own address until a vehicle sends
-tcp:HOST:PORT              connect to the vehicle
+udpin:HOST:PORT            wait at our own address until a vehicle sends; 0.0.0.0 means every interface
+tcp:HOST:PORT              connect to the vehicle, or a bridge to it
 serial:DEVICE:BAUD         a telemetry radio or cable
 """
 
 import ipaddress
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from app.core.errors import InputError, Problem
 
@@ -17,51 +17,18 @@ FORMS: Final = "udp:HOST:PORT[@LOCALPORT], udpin:HOST:PORT, tcp:HOST:PORT or ser
 
 
 @dataclass(frozen=True, slots=True)
-class UdpAddress:
-    """A vehicle that receives at `host`:`port`; `local_port` is ours, None for any free one."""
+class Address:
+    """An address in one of these forms. `place` is the host, ours for udpin, or the serial device; `number` the port or
+    the baud rate; `local_port` ours for udp, None for any free one."""
 
-    host: str
-    port: int
+    kind: Literal["udp", "udpin", "tcp", "serial"]
+    place: str
+    number: int
     local_port: int | None = None
 
     def __str__(self) -> str:
-        return f"udp:{self.host}:{self.port}" + (f"@{self.local_port}" if self.local_port is not None else "")
-
-
-@dataclass(frozen=True, slots=True)
-class UdpInAddress:
-    """Our own address, to which the vehicle sends first; 0.0.0.0 means every interface."""
-
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        return f"udpin:{self.host}:{self.port}"
-
-
-@dataclass(frozen=True, slots=True)
-class TcpAddress:
-    """A vehicle, or a bridge to it, that accepts connections at `host`:`port`."""
-
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        return f"tcp:{self.host}:{self.port}"
-
-
-@dataclass(frozen=True, slots=True)
-class SerialAddress:
-    """A serial device, such as /dev/ttyUSB0, and its baud rate."""
-
-    device: str
-    baud: int
-
-    def __str__(self) -> str:
-        return f"serial:{self.device}:{self.baud}"
-
-
-Address = UdpAddress | UdpInAddress | TcpAddress | SerialAddress
+        local = "" if self.local_port is None else f"@{self.local_port}"
+        return f"{self.kind}:{self.place}:{self.number}{local}"
 
 
 def parse(text: str) -> Address:
@@ -71,19 +38,17 @@ def parse(text: str) -> Address:
     match kind:
         case "udp" if place:
             port, at, local = number.partition("@")
-            return UdpAddress(place, _port(text, port), _port(text, local) if at else None)
-        case "udpin" if place:
-            return UdpInAddress(place, _port(text, number))
-        case "tcp" if place:
-            return TcpAddress(place, _port(text, number))
+            return Address(kind, place, _port(text, port), _port(text, local) if at else None)
+        case "udpin" | "tcp" if place:
+            return Address(kind, place, _port(text, number))
         case "serial" if place:
-            return SerialAddress(place, _positive(text, number, "the baud rate"))
+            return Address(kind, place, _positive(text, number, "the baud rate"))
     raise _error(text, f"must be {FORMS}")
 
 
 def is_loopback(address: Address) -> bool:
     """Whether the address is on this computer, and so of a simulation, not a vehicle."""
-    return not isinstance(address, SerialAddress) and is_loopback_host(address.host)
+    return address.kind != "serial" and is_loopback_host(address.place)
 
 
 def is_loopback_host(host: str) -> bool:

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.link import Received
 
@@ -77,8 +79,9 @@ class AltitudeSource:
     """Second source of altitude, which receives poses in its own thread or through `on_message`; no method waits.
 
     Poses are queued as samples; one thread may `put` while another takes. A pose is new if its time has advanced and it
-    differs from the previous one in at least one bit: measured poses always differ, but a system that has lost a body
-    may repeat the last pose. The altitudes are converted to the vehicle's datum by their values on the ground.
+    differs from the previous one in at least one value, where a missing one (NaN) equals another: measured poses always
+    differ, but a system that has lost a body may repeat the last pose. The altitudes are converted to the vehicle's
+    datum by their values on the ground.
     """
 
     def __init__(self, name: str) -> None:
@@ -117,7 +120,7 @@ class AltitudeSource:
             measured_s=self._arrivals.measured_s(time_s, arrived_s) if later else arrived_s,
             altitude_m=pose.altitude_m,
             tracking_valid=pose.tracking_valid and math.isfinite(pose.altitude_m),
-            advances=later and not _is_same(pose.values, self._values),
+            advances=later and not np.array_equal(pose.values, self._values, equal_nan=True),
         )
         if later:
             self._time_s, self._values = time_s, pose.values
@@ -149,10 +152,3 @@ class AltitudeSource:
             )
             for sample, is_new in samples
         ]
-
-
-def _is_same(pose: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Whether two poses are equal bit by bit; NaN (missing) equals NaN."""
-    return len(pose) == len(other) and all(
-        a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(pose, other, strict=True)
-    )

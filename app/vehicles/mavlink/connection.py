@@ -101,7 +101,7 @@ class VehicleConnection(ObservedVehicle):
 
     def _restore_all(self) -> str:
         """Restore the safe gains and the other parameters of a trial; return the problem, or an empty string."""
-        return self._gains.restore_or_explain() or self._parameters.restore()
+        return self._gains.restore() or self._parameters.restore()
 
     def _restore_or_quarantine(self) -> None:
         """Restore the safe gains, because the staged gains are not flown; quarantine the vehicle if they cannot be

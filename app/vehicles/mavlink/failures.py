@@ -6,7 +6,6 @@ The table is ordered by severity: of several failures the first one counts.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final, Literal
 
 from app.vehicles.flight_end import Failure, StopRequest
@@ -32,35 +31,33 @@ class Response:
     outcome: Outcome
 
 
-RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
-    {
-        Failure.NO_HEARTBEAT: Response("none", "refused"),
-        Failure.PARAMETER: Response("restore gains", "refused"),
-        Failure.NOT_ARMED: Response("disarm", "refused"),
-        Failure.NO_LIFT_OFF: Response("disarm", "aborted"),
-        Failure.TAKE_OFF_REFUSED: Response("disarm", "refused"),
-        Failure.LINK: Response("repeat land", "invalid"),
-        Failure.ENVELOPE: Response("land, gains first", "aborted"),
-        Failure.BATTERY: Response("land", "invalid"),
-        Failure.OPERATOR: Response("land, gains first", "aborted"),
-        Failure.FROZEN: Response("land", "invalid"),
-        Failure.GLITCHES: Response("note", "invalid"),
-        Failure.DISAGREEMENT: Response("land", "invalid"),
-        Failure.LOST_POSITION: Response("land", "invalid"),
-        Failure.SLOW_CLOCK: Response("land", "invalid"),
-        Failure.TAKEN_OVER: Response("cease", "quarantine"),
-        Failure.UNEXPECTED: Response("land", "quarantine"),
-        Failure.INTERRUPTED: Response("note", "invalid"),
-        Failure.OWN_LANDING: Response("land", "invalid"),
-        Failure.DUPLICATE: Response("land", "quarantine"),
-        Failure.FALL: Response("note", "quarantine"),
-        Failure.SET_POINT: Response("land", "invalid"),
-        # It may ring, and would land for seconds on these gains; but it may also drift, or be moved by its estimator or
-        # the wind: this does not count against the gains, unless it exceeds a limit.
-        Failure.NOT_SETTLED: Response("land, gains first", "invalid"),
-        Failure.PAUSED: Response("land", "invalid"),
-    }
-)
+RESPONSES: Final[Mapping[Failure, Response]] = {
+    Failure.NO_HEARTBEAT: Response("none", "refused"),
+    Failure.PARAMETER: Response("restore gains", "refused"),
+    Failure.NOT_ARMED: Response("disarm", "refused"),
+    Failure.NO_LIFT_OFF: Response("disarm", "aborted"),
+    Failure.TAKE_OFF_REFUSED: Response("disarm", "refused"),
+    Failure.LINK: Response("repeat land", "invalid"),
+    Failure.ENVELOPE: Response("land, gains first", "aborted"),
+    Failure.BATTERY: Response("land", "invalid"),
+    Failure.OPERATOR: Response("land, gains first", "aborted"),
+    Failure.FROZEN: Response("land", "invalid"),
+    Failure.GLITCHES: Response("note", "invalid"),
+    Failure.DISAGREEMENT: Response("land", "invalid"),
+    Failure.LOST_POSITION: Response("land", "invalid"),
+    Failure.SLOW_CLOCK: Response("land", "invalid"),
+    Failure.TAKEN_OVER: Response("cease", "quarantine"),
+    Failure.UNEXPECTED: Response("land", "quarantine"),
+    Failure.INTERRUPTED: Response("note", "invalid"),
+    Failure.OWN_LANDING: Response("land", "invalid"),
+    Failure.DUPLICATE: Response("land", "quarantine"),
+    Failure.FALL: Response("note", "quarantine"),
+    Failure.SET_POINT: Response("land", "invalid"),
+    # It may ring, and would land for seconds on these gains; but it may also drift, or be moved by its estimator or
+    # the wind: this does not count against the gains, unless it exceeds a limit.
+    Failure.NOT_SETTLED: Response("land, gains first", "invalid"),
+    Failure.PAUSED: Response("land", "invalid"),
+}
 
 
 HELP: Final = "fly it manually, or stop its motors"

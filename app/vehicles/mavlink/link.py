@@ -39,7 +39,7 @@ UNATTENDED_AFTER_S: Final = 3.0
 """If `receive` has not been called for this long, the program hangs. No more heartbeats are sent then, so that the
 vehicle's own failsafe for a lost ground station can act."""
 MAX_QUEUED_MESSAGES: Final = 20_000
-"""Maximum number of messages that wait for `receive`; beyond it the oldest are dropped, and counted."""
+"""Maximum number of messages that wait for `receive`; beyond it the oldest are dropped."""
 STEP_S: Final = 1.0 / 256.0
 """Step of the clock between two reads of a transport without a thread."""
 DUPLICATE_TIMEOUT_S: Final = 3.0
@@ -110,7 +110,7 @@ class Link:
         self._health = LinkHealth()
         self._next_heartbeat_s = self._attended_s = self._opened_s
         self._listeners = 0
-        self._inbox: deque[Received] = deque()
+        self._inbox: deque[Received] = deque(maxlen=MAX_QUEUED_MESSAGES)
         self._inbox_changed = threading.Condition()
         self._sending = threading.Lock()
         self._is_closing = self._is_closed = False
@@ -145,7 +145,8 @@ class Link:
             return replace(self._health, lost=self._losses.lost)
 
     def send(self, kind: str, **fields: FieldValue) -> None:
-        """Send the message `kind` ("PARAM_SET") without waiting; on return it was sent or counted as unsent.
+        """Send the message `kind` ("PARAM_SET") without waiting; on return it was sent, or dropped: without a peer or
+        connection, or because a buffer is full.
 
         Raises ValueError for a message or fields that the dialect does not have, LinkError if the link is closed.
         """
@@ -250,10 +251,7 @@ class Link:
         """Send a message; the caller holds the lock for sending."""
         frame = self._codec.pack(message)
         if self._transport.write(frame):
-            self._health.sent += 1
             self._record(frame)
-        else:
-            self._health.unsent += 1
 
     def _process_data(self, data: bytes, peer: Peer) -> None:
         remote = self._transport.remote
@@ -270,7 +268,7 @@ class Link:
         vehicle's first packet."""
         messages = self._new_codec().parse(data)
         if any(self._is_vehicle(message) for message in messages):
-            self._transport.adopt(peer)
+            self._transport.remote = peer
             self._queue(messages)
         else:
             self._health.foreign += 1
@@ -282,7 +280,7 @@ class Link:
         is_gone = now_s - since_s > GONE_AFTER_S
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
-                self._transport.adopt(peer)
+                self._transport.remote = peer
         elif not is_gone and self._health.last_packet_s is not None and self._others.may_check(peer, now_s):
             message = next((each for each in self._new_codec().parse(data) if self._poses_as_vehicle(each)), None)
             if message is None:
@@ -293,7 +291,7 @@ class Link:
             if verdict == "duplicate":
                 self._duplicate_s = now_s
             elif verdict == "moved" and is_same_host:
-                self._transport.adopt(peer)
+                self._transport.remote = peer
 
     def _poses_as_vehicle(self, message: Message) -> bool:
         """Whether a message of another peer has the vehicle's ids, and is no copy of one of its own."""
@@ -320,11 +318,7 @@ class Link:
         if not fresh:
             return
         with self._inbox_changed:
-            excess = max(len(self._inbox) + len(fresh) - MAX_QUEUED_MESSAGES, 0)
-            self._health.overrun += excess
             self._inbox.extend(fresh)
-            for _ in range(excess):
-                self._inbox.popleft()
             self._inbox_changed.notify_all()
 
     def _accepts(self, message: Message, now_s: float) -> bool:

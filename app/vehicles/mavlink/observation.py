@@ -49,7 +49,7 @@ class TrialObservation:
     identity: IdentityMonitor
 
     @property
-    def last(self) -> Position | None:
+    def last(self) -> Position:
         """The newest plausible position."""
         return self.positions.last
 
@@ -58,7 +58,7 @@ class TrialObservation:
         cls,
         now_s: float,
         *,
-        last: Position | None = None,
+        last: Position,
         battery_v: float | None = None,
         stood_s: float = 0.0,
         reports_landing: bool = False,
@@ -74,7 +74,7 @@ class TrialObservation:
             ground=GroundMonitor(
                 landed=True if reports_landing else None,
                 landed_s=-math.inf,
-                grounded_since_s=None if last is None else now_s - stood_s,
+                grounded_since_s=now_s - stood_s,
             ),
             envelope=EnvelopeMonitor(origin=last),
             climb=ClimbMonitor(),
@@ -99,8 +99,8 @@ class TrialObservation:
 
     def change_set_point(self, set_point_m: float) -> "TrialObservation":
         """Return the observation of a vehicle that is to fly to another set point, on whose one side it is now."""
-        is_above = self.last is not None and self.last.altitude_m > set_point_m
-        return replace(self, envelope=replace(self.envelope, side=1 if is_above else -1, may_overshoot=True))
+        side = 1 if self.last.altitude_m > set_point_m else -1
+        return replace(self, envelope=replace(self.envelope, side=side, may_overshoot=True))
 
     def update(
         self, measurement: Measurement | None, now_s: float, plan: Plan
@@ -112,7 +112,7 @@ class TrialObservation:
         match measurement:
             case Position():
                 return watch._add_position(measurement, now_s, plan)
-            case InvalidPosition(time_boot_s=time_boot_s) if watch.last is None or time_boot_s > watch.last.time_boot_s:
+            case InvalidPosition(time_boot_s=time_boot_s) if time_boot_s > watch.last.time_boot_s:
                 watch = replace(watch, clock=replace(watch.clock, advanced_s=now_s, stuck_s=0.0))
             case Attitude(lean_rad=lean_rad):
                 watch = replace(watch, envelope=watch.envelope.add_attitude(lean_rad, now_s))
@@ -134,7 +134,7 @@ class TrialObservation:
     ) -> tuple["TrialObservation", tuple[Position, ...]]:
         newest, last = self.positions.doubted or self.last, self.last
         position = unwrapped(position, newest)
-        if newest is not None and not self.clock.continues(position, newest, now_s):
+        if not self.clock.continues(position, newest, now_s):
             clock, has_rebooted = self.clock.add_other(position, newest, now_s)
             if not has_rebooted:
                 return replace(self, clock=clock), ()
@@ -160,7 +160,7 @@ class TrialObservation:
 
     def update_secondary(self, sample: SecondaryAltitudeReceived) -> "TrialObservation":
         """Return the observation after a sample of the second source of altitude."""
-        vehicle_m = self.last.altitude_m if self.last is not None and self.positions.is_fresh(sample.now_s) else None
+        vehicle_m = self.last.altitude_m if self.positions.is_fresh(sample.now_s) else None
         return replace(self, second=self.second.update(sample, vehicle_m))
 
     def settle(self, now_s: float, plan: Plan, *, commanded: bool) -> "TrialObservation":
@@ -195,9 +195,7 @@ class TrialObservation:
         """Whether it reports that it is on the ground, or in a block of its plan that has no thrust, and its altitude
         has not drifted further than one may, nor faster. To be called for a vehicle that was not commanded to take
         off."""
-        last = self.last
-        stays = last is None or abs(last.altitude_m - plan.ground_m) <= DRIFT_M
-        stays = stays and (last is None or abs(last.climb_rate_m_s) <= _DRIFT_M_S)
+        stays = abs(self.positions.height_m(plan.ground_m)) <= DRIFT_M and abs(self.last.climb_rate_m_s) <= _DRIFT_M_S
         stands = self.ground.reports(now_s, landed=True, within_s=STANDS_S)
         return stays and (stands or self.modes.block in plan.autopilot.arming_blocks)
 

@@ -5,6 +5,7 @@
 import json
 import os
 import re
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -139,7 +140,6 @@ class GainStore:
     def __init__(self, radio: AutopilotLink, safe: Gains) -> None:
         """Check the safe gains. Raises GainsError if the autopilot cannot hold them."""
         self._radio = radio
-        self._gain_set: GainSet | None = None
         self.safe: Final[Gains] = check_gains(safe, radio.profile.gain_sets[0])
         self.staged: dict[str, float] | None = None
         self.held: dict[str, float] = {}
@@ -157,7 +157,7 @@ class GainStore:
     def stage(self, gains: Gains) -> dict[str, float]:
         """Write gains for the next flight and return those read back. Raises GainsError, and changes nothing, for gains
         that may not be written; VehicleError if the vehicle does not reply."""
-        wanted = check_gains(gains, self._found())
+        wanted = check_gains(gains, self._gain_set)
         self.staged = None
         held = self._write(wanted)
         self.staged = held if held == wanted else None
@@ -165,17 +165,13 @@ class GainStore:
 
     def read(self) -> dict[str, float]:
         """Read the gains. Raises VehicleError if the vehicle does not reply."""
-        return dict(self._note(self._radio.seen.restarts, read_gains(self._radio, self._found(), self.wanted)))
+        return dict(self._note(self._radio.seen.restarts, read_gains(self._radio, self._gain_set, self.wanted)))
 
-    def restore(self) -> dict[str, float]:
-        """Write the safe gains and return those read back. Raises VehicleError if the vehicle does not reply."""
+    def restore(self) -> str:
+        """Write the safe gains and read them back; return why they cannot be verified, or an empty string."""
         self.staged = None
-        return dict(self._write(self.safe))
-
-    def restore_or_explain(self) -> str:
-        """Restore the safe gains; return why they cannot be verified, or an empty string."""
         try:
-            held = self.restore()
+            held = self._write(self.safe)
         except VehicleError as error:
             return str(error)
         mismatch = find_mismatch(held, self.safe)
@@ -189,17 +185,17 @@ class GainStore:
     @property
     def release(self) -> int:
         """Place of its gains among the profile's sets, which are those of its releases."""
-        return self._radio.profile.gain_sets.index(self._found())
+        return self._radio.profile.gain_sets.index(self._gain_set)
 
     @property
     def safe_settings(self) -> tuple[Setting, ...]:
         """Safe gains in the order in which an abort sends them."""
-        return settings(self._found(), self.safe)
+        return settings(self._gain_set, self.safe)
 
     @property
     def staged_settings(self) -> tuple[Setting, ...]:
         """Staged gains, which it was seen to hold; none without staged ones."""
-        return () if self.staged is None else settings(self._found(), self.staged)
+        return () if self.staged is None else settings(self._gain_set, self.staged)
 
     def check(self) -> CheckItem:
         """Read the gains and check that they are those wanted."""
@@ -218,14 +214,12 @@ class GainStore:
             hint="" if held == self.wanted else "Restore its safe gains, then stage again.",
         )
 
-    def _found(self) -> GainSet:
-        """Return the gains by the names on this vehicle. Raises VehicleError if it has none of the known names."""
-        if self._gain_set is not None:
-            return self._gain_set
+    @cached_property
+    def _gain_set(self) -> GainSet:
+        """Its gains by the names on this vehicle. Raises VehicleError if it has none of the known names."""
         radio = self._radio
         for gain_set in radio.profile.gain_sets:
             if read_parameter(radio, gain_set[0].parameter) is not None:
-                self._gain_set = gain_set
                 return gain_set
         tried = ", ".join(gain_set[0].parameter for gain_set in radio.profile.gain_sets)
         raise VehicleError(
@@ -236,7 +230,7 @@ class GainStore:
     def _write(self, wanted: Gains) -> dict[str, float]:
         """Write all gains, then return those read back. Raises VehicleError if the vehicle does not reply."""
         radio = self._radio
-        restarts, gain_set = radio.seen.restarts, self._found()
+        restarts, gain_set = radio.seen.restarts, self._gain_set
         for gain in gain_set:
             if write_parameter(radio, gain.parameter, gain.sent(wanted[gain.gain])) is None:
                 raise _unconfirmed(gain)
@@ -289,7 +283,6 @@ class TrialParameters:
 
     def __init__(self, radio: AutopilotLink, files: Callable[[], tuple[Path, ...]] = tuple) -> None:
         self._radio, self._named = radio, files
-        self._changed: dict[str, ChangedParameter] | None = None
 
     def set(self, settings: tuple[Setting, ...]) -> None:
         """Set the parameters for a flight. Raises VehicleError if the vehicle does not report the current values or
@@ -299,18 +292,18 @@ class TrialParameters:
             if held is None:
                 raise _unset(setting)
             if held != setting.value:
-                self._keep({setting.parameter: ChangedParameter(held, setting.value)} | self._remembered())
+                self._keep({setting.parameter: ChangedParameter(held, setting.value)} | self._changed)
                 if not self._write(setting):
                     raise _unset(setting)
 
     def restore(self) -> str:
         """Restore the old values; return the problem, or an empty string."""
         try:
-            for name, changed in tuple(self._remembered().items()):
+            for name, changed in tuple(self._changed.items()):
                 held = read_parameter(self._radio, name)
                 if held is None or (held == changed.during and not self._write(Setting(name, changed.before))):
                     return f"{name} could not be restored to {changed.before:g}."
-                self._keep({other: one for other, one in self._remembered().items() if other != name})
+                self._keep({other: one for other, one in self._changed.items() if other != name})
         except VehicleError as error:
             return str(error)
         return ""
@@ -326,13 +319,11 @@ class TrialParameters:
     def _files(self) -> tuple[Path, ...]:
         return self._named()
 
-    def _remembered(self) -> dict[str, ChangedParameter]:
-        """Return the changes of this process, or of an earlier one on a vehicle with this autopilot and system id.
-        Raises VehicleError if a file cannot be read."""
-        if self._changed is None:
-            read = [self._read(file) for file in self._files]
-            self._changed = {name: one for changed in reversed(read) for name, one in changed.items()}
-        return self._changed
+    @cached_property
+    def _changed(self) -> dict[str, ChangedParameter]:
+        """The changes of this process, or of an earlier one on a vehicle with this autopilot and system id. Raises
+        VehicleError if a file cannot be read."""
+        return dict(ChainMap(*map(self._read, self._files)))
 
     def _read(self, file: Path) -> dict[str, ChangedParameter]:
         try:

@@ -72,11 +72,6 @@ class LinkHealth:
     """Sections of bad data: wrong checksums, wrong signatures."""
     foreign: int = 0
     """Datagrams of other senders and messages of other systems, all dropped."""
-    overrun: int = 0
-    """Messages dropped because `receive` was not called."""
-    sent: int = 0
-    unsent: int = 0
-    """Messages that could not be sent: no peer yet, no connection, full buffer."""
     last_packet_s: float | None = None
     last_heartbeat_s: float | None = None
 

@@ -141,12 +141,9 @@ def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[st
         "climb_rate_m_s": sample.position.climb_rate_m_s,
         "set_point_m": sample.set_point_m - datum_m,
     }
-    if sample.battery_v is not None:
-        channels["battery_v"] = sample.battery_v
-    if sample.throttle is not None:
-        channels["throttle"] = sample.throttle
-    if sample.reference_m is not None:
-        channels[REFERENCE] = sample.reference_m - datum_m
+    reference_m = None if sample.reference_m is None else sample.reference_m - datum_m
+    further = {"battery_v": sample.battery_v, "throttle": sample.throttle, REFERENCE: reference_m}
+    channels |= {name: value for name, value in further.items() if value is not None}
     if sample.second_m is not None:
         second_m = sample.second_m - datum_m
         scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)

@@ -51,22 +51,19 @@ def referred_from_s(plan: Plan) -> float:
 
 def note_settling(trial: Trial, positions: tuple[Position, ...]) -> Trial:
     """Note the positions by which the vehicle is at rest before the first step; none if there is no step."""
-    first_s, start_s, seen = _first_step_s(trial), trial.commanded_boot_s, trial.set_points
-    if len(seen.changes) >= trial.plan.first_step or first_s is None or start_s is None:
+    from_s, start_s, seen = referred_from_s(trial.plan), trial.commanded_boot_s, trial.set_points
+    if len(seen.changes) >= trial.plan.first_step or start_s is None:
         return trial
-    recent = tuple(each for each in positions if each.time_boot_s - start_s >= first_s - SETTLED_FOR_S)
+    recent = tuple(each for each in positions if each.time_boot_s - start_s >= from_s)
     return replace(trial, set_points=replace(seen, settling=(*seen.settling, *recent))) if recent else trial
 
 
 def is_due(trial: Trial, now_s: float) -> bool:
     """Whether the next set point is to be commanded now. While the vehicle has not confirmed the previous one, none
     is; it holds the first one once its climb is over, but no later than it must be at rest."""
-    due_s, first_s = _time_s(trial, len(trial.set_points.changes) + 1), _first_step_s(trial)
-    if due_s is None or first_s is None or trial.set_points.is_changing:
-        return False
-    elapsed_s = _elapsed_s(trial, now_s)
-    waits = is_hold(trial) and _climbs(trial) and elapsed_s < first_s - SETTLED_FOR_S
-    return elapsed_s >= due_s - LEAD_S and not waits
+    due_s, elapsed_s = _time_s(trial, len(trial.set_points.changes) + 1), _elapsed_s(trial, now_s)
+    waits = is_hold(trial) and _climbs(trial) and elapsed_s < referred_from_s(trial.plan)
+    return elapsed_s >= due_s - LEAD_S and not (waits or trial.set_points.is_changing)
 
 
 def is_hold(trial: Trial) -> bool:
@@ -76,21 +73,21 @@ def is_hold(trial: Trial) -> bool:
 
 def find_unsettled(trial: Trial) -> Finding | None:
     """Find that the vehicle is not at rest before the first step, or still climbs when it should hold."""
-    first_s, start_s = _first_step_s(trial), trial.commanded_boot_s
+    plan, start_s = trial.plan, trial.commanded_boot_s
     why: str | None = None
     if is_hold(trial):
         why = "had not ended its climb by itself in time for the first step" if _climbs(trial) else None
-    elif len(trial.set_points.changes) + 1 == trial.plan.first_step and first_s is not None and start_s is not None:
+    elif len(trial.set_points.changes) + 1 == plan.first_step and start_s is not None:
         time_s = np.array([each.time_boot_s - start_s for each in trial.set_points.settling])
-        altitude_m = np.array([each.altitude_m - trial.plan.datum_m for each in trial.set_points.settling])
-        why = unsettled(time_s, altitude_m, first_s, trial.plan.set_points.altitudes_m[0])
+        altitude_m = np.array([each.altitude_m - plan.datum_m for each in trial.set_points.settling])
+        why = unsettled(time_s, altitude_m, plan.set_points.times_s[plan.first_step], plan.set_points.altitudes_m[0])
     return None if why is None else Finding(Failure.NOT_SETTLED, f"The vehicle {why}.")
 
 
 def find_overdue(trial: Trial, now_s: float) -> Finding | None:
     """Find that the next step is not confirmed although it was due long ago."""
-    due_s = _time_s(trial, max(len(trial.set_points.changes) + 1, trial.plan.first_step))  # None after the last
-    if due_s is None or _elapsed_s(trial, now_s) <= due_s + _OVERDUE * _LATE_S * trial.plan.timeout_factor:
+    due_s = _time_s(trial, max(len(trial.set_points.changes) + 1, trial.plan.first_step))
+    if _elapsed_s(trial, now_s) <= due_s + _OVERDUE * _LATE_S * trial.plan.timeout_factor:
         return None
     return Finding(Failure.SET_POINT, f"The set point of {due_s:g} s was not confirmed in time.")
 
@@ -146,15 +143,10 @@ def _climbs(trial: Trial) -> bool:
     return bool(modes) and trial.watch.modes.agreed not in modes
 
 
-def _first_step_s(trial: Trial) -> float | None:
-    """Time of the first step since the takeoff command; None without steps."""
-    return _time_s(trial, trial.plan.first_step)
-
-
-def _time_s(trial: Trial, number: int) -> float | None:
-    """Time of a set point since the takeoff command, counted from the takeoff's, 0; None if there is none."""
+def _time_s(trial: Trial, number: int) -> float:
+    """Time of a set point since the takeoff command, counted from the takeoff's, 0; infinite if there is none."""
     times_s = trial.plan.set_points.times_s
-    return times_s[number] if number < len(times_s) else None
+    return times_s[number] if number < len(times_s) else math.inf
 
 
 def _elapsed_s(trial: Trial, now_s: float) -> float:

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from app.vehicles.base import Condition
@@ -15,20 +14,13 @@ _COUNT_EVERY_S: Final = 1.0
 _MAX_AGE_S: Final = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Count:
-    at_s: float
-    received: int
-    lost: int
-
-
 class StatusReader:
     """Reads the state of a vehicle without sending or waiting. Losses are counted over about the last ten seconds."""
 
     def __init__(self, radio: AutopilotLink) -> None:
         self._radio = radio
-        opened = _Count(radio.clock.now_s(), 0, 0)
-        self._counts: deque[_Count] = deque([opened], maxlen=round(LOSS_OVER_S / _COUNT_EVERY_S) + 1)
+        opened = (radio.clock.now_s(), LinkHealth())
+        self._counts: deque[tuple[float, LinkHealth]] = deque([opened], maxlen=round(LOSS_OVER_S / _COUNT_EVERY_S) + 1)
 
     def read(self, *, step: str, datum_m: float, held: Mapping[str, float], trouble: str) -> Condition:
         """Return the current state; altitude counts from `datum_m` on the vehicle's own datum."""
@@ -61,9 +53,9 @@ class StatusReader:
         return name if number in profile.modes_without_land else self._radio.block or name
 
     def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
-        if now_s - self._counts[-1].at_s >= _COUNT_EVERY_S:
-            self._counts.append(_Count(now_s, health.received, health.lost))
-        first = self._counts[0]
+        if now_s - self._counts[-1][0] >= _COUNT_EVERY_S:
+            self._counts.append((now_s, health))
+        _, first = self._counts[0]
         lost, received = health.lost - first.lost, health.received - first.received
         return lost / (lost + received) if lost + received else None
 

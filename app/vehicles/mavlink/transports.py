@@ -17,14 +17,7 @@ from typing import Final, Protocol
 import serial
 
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.addresses import (
-    Address,
-    SerialAddress,
-    TcpAddress,
-    UdpAddress,
-    UdpInAddress,
-    is_loopback_host,
-)
+from app.vehicles.mavlink.addresses import Address, is_loopback_host
 
 Peer = tuple[str, int]
 """Sender of data: host and port, or device and baud rate."""
@@ -47,9 +40,8 @@ class LinkError(VehicleError):
 class Transport(Protocol):
     """Transport to and from one peer. One thread reads and closes; any thread may `write` and `wake` until then."""
 
-    @property
-    def remote(self) -> Peer | None:
-        """Peer that `write` sends to; None until it is known (`adopt`)."""
+    remote: Peer | None
+    """Peer that `write` sends to; None until it is known and set."""
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         """Return the data received, each a datagram or a piece of a stream, with its sender: over UDP anybody can send.
@@ -57,9 +49,6 @@ class Transport(Protocol):
 
     def write(self, data: bytes) -> bool:
         """Send without waiting; return false without a peer or connection, or if the buffer is full."""
-
-    def adopt(self, peer: Peer) -> None:
-        """Send to `peer` from now on."""
 
     def wake(self) -> None:
         """Make a `read` of another thread return at once."""
@@ -69,16 +58,17 @@ class Transport(Protocol):
 
 def open_transport(address: Address) -> Transport:
     """Open the transport of an address. Raises LinkError if it cannot be opened."""
-    match address:
-        case UdpAddress(host, port, local_port):
-            ours = ("127.0.0.1" if is_loopback_host(host) else "0.0.0.0", local_port or 0)  # noqa: S104
-            return UdpTransport(ours, _resolved(address, host, port))
-        case UdpInAddress(host, port):
-            return UdpTransport(_resolved(address, host, port), None)
-        case TcpAddress(host, port):
-            return StreamTransport((host, port), lambda: _connected(host, port))
-        case SerialAddress(device, baud):
-            return StreamTransport((device, baud), lambda: _serial_port(device, baud))
+    place, number = address.place, address.number
+    match address.kind:
+        case "udp":
+            ours = ("127.0.0.1" if is_loopback_host(place) else "0.0.0.0", address.local_port or 0)  # noqa: S104
+            return UdpTransport(ours, _resolved(address))
+        case "udpin":
+            return UdpTransport(_resolved(address), None)
+        case "tcp":
+            return StreamTransport((place, number), lambda: _connected(place, number))
+        case "serial":
+            return StreamTransport((place, number), lambda: _serial_port(place, number))
 
 
 class UdpTransport:
@@ -116,9 +106,6 @@ class UdpTransport:
             return False
         return True
 
-    def adopt(self, peer: Peer) -> None:
-        self.remote = peer
-
     def wake(self) -> None:
         self._waiter.wake()
 
@@ -136,8 +123,8 @@ class StreamTransport:
 
     def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
         """Open the stream by `opened`, which raises OSError on failure. Raises LinkError if that fails now."""
-        self.remote: Final = peer
-        self._opened = opened
+        self.remote: Peer | None = peer
+        self._opened, self._peer = opened, peer
         try:
             self._stream: _Stream | None = opened()
         except OSError as error:
@@ -161,7 +148,7 @@ class StreamTransport:
             with self._writing:
                 self._flush(self._stream)
         data = self._receive(self._stream) if is_readable else b""
-        return [(data, self.remote)] if data else []
+        return [(data, self._peer)] if data else []
 
     def write(self, data: bytes) -> bool:
         with self._writing:
@@ -172,9 +159,6 @@ class StreamTransport:
             if self._backlog or self._is_broken:
                 self._waiter.wake()
             return not self._is_broken
-
-    def adopt(self, peer: Peer) -> None:
-        """Do nothing: there is only one peer."""
 
     def wake(self) -> None:
         self._waiter.wake()
@@ -271,12 +255,12 @@ def _serial_port(device: str, baud: int) -> serial.Serial:
         raise OSError(str(error)) from error
 
 
-def _resolved(address: Address, host: str, port: int) -> Peer:
+def _resolved(address: Address) -> Peer:
     try:
-        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+        found = socket.getaddrinfo(address.place, address.number, socket.AF_INET, socket.SOCK_DGRAM)
     except OSError as error:
         raise _cannot_open(str(address), error) from error
-    return str(found[0][4][0]), port
+    return str(found[0][4][0]), address.number
 
 
 def _cannot_open(what: str, error: OSError) -> LinkError:

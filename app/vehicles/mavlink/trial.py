@@ -6,7 +6,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from app.autopilots.commands import Action, Outgoing, Target, read_parameter
+from app.autopilots.commands import Action, Outgoing, read_parameter
 from app.autopilots.measurements import Position
 from app.vehicles.base import Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import Requester, StopRequest
@@ -32,7 +32,7 @@ from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
 from app.vehicles.mavlink.radio import AutopilotLink
-from app.vehicles.mavlink.records import Reference, at_last_times
+from app.vehicles.mavlink.records import Reference, Scored, at_last_times, channels_of
 from app.vehicles.mavlink.sent_commands import CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import advance, begin
@@ -60,8 +60,8 @@ class TrialRunner:
     """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
 
     `restore` writes the safe gains, reads them back, and returns the problem, or an empty string. `look` returns the
-    samples of the second source of altitude since the last call; `channels` converts a record's sample and a datum to
-    the channels of live telemetry; `reference` computes the autopilot's own reference, if it does not send it.
+    samples of the second source of altitude since the last call; `scored` is the source whose altitude is shown as the
+    vehicle's in live telemetry; `reference` computes the autopilot's own reference, if it does not send it.
 
     Then it has flown: `trial` is its state, `samples` its record, `error` the first exception of the caller's
     functions. `offset_s` converts the vehicle's clock to ours, by the packet with the least latency.
@@ -76,12 +76,12 @@ class TrialRunner:
         restore: Callable[[], str],
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
-        channels: Callable[[RecordSample, float], dict[str, float]],
+        scored: Scored,
         look: Callable[[], Sequence[SecondaryAltitudeReceived]],
         reference: Reference | None = None,
     ) -> None:
         self.reference = reference
-        self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
+        self._radio, self._restore, self._scored, self._look = radio, restore, scored, look
         self._loop = replace(radio.seen.loop)
         self.offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
@@ -107,8 +107,7 @@ class TrialRunner:
 
     def _note_sinking(self) -> None:
         """Note since when the vehicle has not descended by `SINKS_M`."""
-        trial, last = self.trial, self.trial.watch.last
-        altitude_m = float("inf") if last is None else last.altitude_m
+        trial, altitude_m = self.trial, self.trial.watch.last.altitude_m
         if trial.state not in LANDING or altitude_m < self._sank_to_m - SINKS_M:
             self._sank_s, self._sank_to_m = self._radio.clock.now_s(), altitude_m
 
@@ -148,8 +147,10 @@ class TrialRunner:
             why = f"Gainline stalled for {stalled_s:.0f} s, so the takeoff was not commanded."
             self._advance(ActionRefused(Action.ARM, why, now_s))
         for each in in_order(packets, self._look()):
-            if isinstance(each, PacketReceived):
-                self._note(each)
+            if isinstance(each, PacketReceived):  # each position gets the newest reports of the loop before it
+                self._loop.note(each.measurement, each.now_s)
+                if isinstance(each.measurement, Position):
+                    self.offset_s = min(self.offset_s, each.now_s - each.measurement.time_boot_s)
             self._advance(each)
         if why := self._radio.link.duplicate_reason:
             self._advance(DuplicateVehicleDetected(why, self._radio.clock.now_s()))
@@ -158,13 +159,6 @@ class TrialRunner:
         if self._sequence is not None and (ended := self._sequence.proceed(packets)) is not None:
             self._sequence = None
             self._advance(ended)
-
-    def _note(self, packet: PacketReceived) -> None:
-        """Note what is reported of the loop, in the order of receipt, so that each position gets the newest before it:
-        after a stall of this program many packets are received at once."""
-        self._loop.note(packet.measurement, packet.now_s)
-        if isinstance(packet.measurement, Position):
-            self.offset_s = min(self.offset_s, packet.now_s - packet.measurement.time_boot_s)
 
     def _evaluate(self) -> None:
         if self.trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
@@ -215,20 +209,18 @@ class TrialRunner:
     def _perform(self, command: PerformAction) -> None:
         action, (profile, target) = command.action, (self._radio.profile, self._radio.target)
         if command.altitude_m is not None:
+            if (
+                action is Action.HOLD
+            ):  # set points are flown at the place where it hovers as it begins to hold the first
+                last = self.trial.watch.last
+                self._target = replace(self._target, north_m=last.north_m, east_m=last.east_m)
             target = self._target = replace(
-                self._place(action), altitude_m=command.altitude_m, acceleration_m_s2=command.acceleration_m_s2
+                self._target, altitude_m=command.altitude_m, acceleration_m_s2=command.acceleration_m_s2
             )
             if not self._stream:
                 self._streamed_s = self._radio.clock.now_s()
             self._stream = profile.stream(target)
         self._sequence = CommandSequence(action, profile.steps(action, target), self._radio)
-
-    def _place(self, action: Action) -> Target:
-        """Return the target of set points at the place where the vehicle hovers when it begins to hold the first."""
-        last = self.trial.watch.last
-        if action is not Action.HOLD or last is None:
-            return self._target
-        return replace(self._target, north_m=last.north_m, east_m=last.east_m)
 
     def _keep_streaming(self) -> float:
         """Send the set point again, if it is due: some autopilots leave the mode, and land, without a stream. Return
@@ -273,7 +265,7 @@ class TrialRunner:
         time_s = sample.position.time_boot_s - start_s
         if time_s >= 0.0 and time_s - self._shown_s >= _SAMPLE_EVERY_S:
             self._shown_s = time_s
-            shown = Sample(time_s, self._channels(sample, self.trial.plan.datum_m))
+            shown = Sample(time_s, channels_of(sample, self.trial.plan.datum_m, self._scored))
             self._kept(lambda: self._on_sample(shown))
 
 

@@ -181,11 +181,11 @@ def restoring(trial: Trial, event: Event) -> Step:
 def _confirms_landing(trial: Trial, now_s: float) -> bool:
     """Whether telemetry confirms that the vehicle is landing: it descends, or is near the ground."""
     positions, modes, autopilot = trial.watch.positions, trial.watch.modes, trial.plan.autopilot
-    last = positions.last
-    if last is None or not positions.is_fresh(now_s):
+    if not positions.is_fresh(now_s):
         return False
     is_new = now_s - modes.block_s < _LANDING_BLOCK_S
     lands = is_new and modes.block in autopilot.landing_blocks  # another Land would begin its landing again
     lands = lands or modes.agreed in autopilot.landing_modes - autopilot.flying_modes
     near = not positions.is_airborne(now_s, trial.plan.ground_m)
-    return (near and (lands or not find_doubt_of_descent(trial, now_s))) or last.climb_rate_m_s < DESCENDING_M_S
+    descends = positions.last.climb_rate_m_s < DESCENDING_M_S
+    return (near and (lands or not find_doubt_of_descent(trial, now_s))) or descends

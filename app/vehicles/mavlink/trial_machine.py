@@ -81,12 +81,12 @@ def _poll_settings(trial: Trial, now_s: float) -> Step:
 def _confirm_take_off(trial: Trial, event: Event) -> Step:
     """Note the first reply to a message sent after the takeoff command, and request one until then."""
     takeoff = trial.takeoff
-    if takeoff is None or not trial.may_take_off or (last := trial.watch.last) is None:
+    if takeoff is None or not trial.may_take_off:
         return trial, ()
     measurement = event.measurement if isinstance(event, PacketReceived) else None
     asked = trial.plan.safe_gains[0].parameter
     if isinstance(measurement, Parameter) and measurement.name == asked:
-        takeoff = replace(takeoff, confirmed_boot_s=last.time_boot_s)
+        takeoff = replace(takeoff, confirmed_boot_s=trial.watch.last.time_boot_s)
         return replace(trial, takeoff=takeoff, resting_since_s=None), ()
     if event.now_s - takeoff.requested_s < _REPLY_S:
         return trial, ()
@@ -131,8 +131,8 @@ def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -
     if watch.modes.armed == trial.watch.modes.armed or trial.state not in _FLOWN:
         return trial
     is_up = watch.positions.is_fresh(now_s) and not watch.ground.reports(now_s, landed=True)
-    height_m = watch.positions.height_m(trial.plan.ground_m) if is_up and not watch.modes.armed else None
-    return replace(trial, disarmed_m=height_m or 0.0)
+    height_m = watch.positions.height_m(trial.plan.ground_m) if is_up and not watch.modes.armed else 0.0
+    return replace(trial, disarmed_m=height_m)
 
 
 def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:

@@ -61,7 +61,7 @@ def _arm(trial: Trial, event: Event) -> Step:
     ):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
-    if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S or last is None:
+    if trial.armed_s is None or not trial.watch.modes.armed or now_s - trial.armed_s < BASELINE_S:
         return trial, ()
     trial = measure_ground(replace(trial, watch=trial.watch.begin_climb(last.altitude_m)), now_s)
     watch, plan = trial.watch, trial.plan
@@ -125,10 +125,8 @@ def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
 
 def _waited_s(trial: Trial) -> float:
     """Return by the vehicle's own time how long it has stood since the command, or since it certainly had it."""
-    last, takeoff = trial.watch.last, trial.takeoff
-    if last is None or takeoff is None:
-        return 0.0
-    return last.time_boot_s - (takeoff.confirmed_boot_s or takeoff.boot_s)
+    takeoff = trial.takeoff
+    return 0.0 if takeoff is None else trial.watch.last.time_boot_s - (takeoff.confirmed_boot_s or takeoff.boot_s)
 
 
 def _record(trial: Trial, event: Event) -> Step:
@@ -213,16 +211,16 @@ def _find_set_point_failure(trial: Trial, event: Event) -> Finding | None:
 
 
 def _is_whole(trial: Trial) -> bool:
-    last, start_s = trial.watch.last, trial.commanded_boot_s
-    return last is not None and start_s is not None and last.time_boot_s - start_s >= trial.plan.record_s
+    start_s = trial.commanded_boot_s
+    return start_s is not None and trial.watch.last.time_boot_s - start_s >= trial.plan.record_s
 
 
 def _overtime(trial: Trial, now_s: float) -> Step:
     """End by the ground's clock a record that the vehicle's clock does not end."""
-    plan, last, takeoff = trial.plan, trial.watch.last, trial.takeoff
-    if last is None or takeoff is None or (passed_s := now_s - takeoff.at_s) <= plan.record_s + plan.slow_s:
+    plan, takeoff = trial.plan, trial.takeoff
+    if takeoff is None or (passed_s := now_s - takeoff.at_s) <= plan.record_s + plan.slow_s:
         return trial, ()
-    why = f"Its clock advanced by {last.time_boot_s - takeoff.boot_s:.1f} s in {passed_s:.1f} s."
+    why = f"Its clock advanced by {trial.watch.last.time_boot_s - takeoff.boot_s:.1f} s in {passed_s:.1f} s."
     return fail(trial, Finding(Failure.SLOW_CLOCK, why), now_s)
 
 

@@ -135,7 +135,7 @@ def measure_ground(trial: Trial, now_s: float) -> Trial:
         return trial
     altitudes_m = [position.altitude_m for position in stood]
     is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
-    is_in_place = stood[-1].away_m(watch.envelope.origin or stood[-1]) <= _IN_PLACE_M
+    is_in_place = stood[-1].away_m(watch.envelope.origin) <= _IN_PLACE_M
     shift_m = statistics.median(altitudes_m) - plan.ground_m
     may_shift = plan.autopilot.climbs_from_ground or abs(shift_m) <= _SHIFT_M
     climbed_m = sum(

@@ -9,7 +9,7 @@ from app.autopilots.commands import Setting
 from app.autopilots.measurements import Position
 from app.vehicles.flight_end import Landing, StopRequest, joined, request_text
 from app.vehicles.mavlink.events import Command
-from app.vehicles.mavlink.failures import RESPONSES, Failure, Outcome
+from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.monitors.commanded import SetPointMonitor, SettingMonitor
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
@@ -158,16 +158,6 @@ class Trial:
         be of the time before, and a command to stop its motors would arrive after it."""
         is_under_way = self.takeoff is not None and self.takeoff.confirmed_boot_s is None
         return is_under_way and not self.watch.climb.lifted
-
-    @property
-    def outcome(self) -> Outcome | None:
-        """Outcome of the trial; None without a failure."""
-        if self.state is State.QUARANTINE:
-            return "quarantine"
-        if self.failure is None:
-            return None
-        known = RESPONSES[self.failure].outcome
-        return "invalid" if known == "quarantine" else known
 
     @property
     def has_confirmed_stop(self) -> bool:

@@ -11,7 +11,7 @@ from app.autopilots.autopilot import AutopilotError
 from app.autopilots.commands import Action
 from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
-from app.vehicles.base import CheckItem, Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
+from app.vehicles.base import Condition, FlightOptions, FlightRecord, Sample, ShouldStop, VehicleError
 from app.vehicles.flight_end import FlightEnd, Landing, cause_text, withdrawn_by
 from app.vehicles.mavlink import parameters, preflight, preparation, records
 from app.vehicles.mavlink.connection import VehicleConnection
@@ -194,16 +194,12 @@ class MavlinkVehicle(VehicleConnection):
         except AutopilotError as error:
             raise VehicleError(error.message, hint=error.hint) from error
         hover = preflight.evaluate_hover(self._hover_throttle, limits)
-        time = self._evaluate_time(order)
         self._quarantine.require_none()
-        preflight.require((*items, *time, *requirements, *hover, preflight.evaluate_set_points(order.set_points)))
+        if radio.profile.flying_blocks:
+            time = preflight.evaluate_flight_time(order.record_s, plan_time_s=float(self._options["plan_time_s"]))
+            items = (*items, time)
+        preflight.require((*items, *requirements, *hover, preflight.evaluate_set_points(order.set_points)))
         return watched
-
-    def _evaluate_time(self, order: FlightOptions) -> tuple[CheckItem, ...]:
-        """Check that the flight fits the vehicle's flight plan, if it has one."""
-        if not self._radio.profile.flying_blocks:
-            return ()
-        return (preflight.evaluate_flight_time(order.record_s, plan_time_s=float(self._options["plan_time_s"])),)
 
     def _fly(
         self,
@@ -234,7 +230,7 @@ class MavlinkVehicle(VehicleConnection):
             restore=self._restore_all,
             on_sample=on_sample,
             should_stop=should_stop,
-            channels=lambda sample, datum_m: records.channels_of(sample, datum_m, self._scored),
+            scored=self._scored,
             look=list if self._secondary is None else self._secondary.take_samples,
             reference=reference,
         )

@@ -6,6 +6,7 @@ mavlink:ADDRESS             the same messages on another link, ADDRESS as for ve
 """
 
 import ipaddress
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, Literal
 from urllib.parse import parse_qsl
@@ -115,13 +116,10 @@ def _ip(text: str, key: str, address: str) -> str:
 
 
 def _group(text: str, address: str) -> str:
-    try:
-        group = ipaddress.IPv4Address(address)
-    except ValueError:
-        group = None
-    if group is None or not group.is_multicast:
-        raise _error(text, f"multicast must be a group such as {MULTICAST}, or no, got {address!r}")
-    return str(group)
+    with suppress(ValueError):
+        if (group := ipaddress.IPv4Address(address)).is_multicast:
+            return str(group)
+    raise _error(text, f"multicast must be a group such as {MULTICAST}, or no, got {address!r}")
 
 
 def _error(text: str, reason: str) -> InputError:

@@ -5,10 +5,9 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from typing import Final
 
-from natnet import NatNetClient, NatNetError, Version
+from natnet import DataFrame, NatNetClient, NatNetError, Version
 
 from app.core.clock import Clock
 from app.vehicles.base import VehicleError
@@ -23,37 +22,6 @@ _FIRST_WITH_TRACKING: Final = Version(2, 6)
 _GARBLED: Final = (struct.error, ValueError, TypeError, LookupError, OverflowError, MemoryError, NatNetError)
 """Exceptions of the library for packets that violate the protocol."""
 _UP: Final = {"y": 1, "z": 2}
-
-
-class _RigidBody(Protocol):
-    id_num: int
-    pos: tuple[float, float, float]
-    rot: tuple[float, float, float, float]
-    tracking_valid: bool | None
-
-
-class _Suffix(Protocol):
-    timestamp: float
-
-
-class _Frame(Protocol):
-    rigid_bodies: Sequence[_RigidBody]
-    suffix: _Suffix
-
-
-class _Event(Protocol):
-    handlers: list[Callable[[_Frame], None]]
-
-
-class _Client(Protocol):
-    """The library's client; packets are processed in the thread that calls `connect` or `update_sync`."""
-
-    on_data_frame_received_event: _Event
-    protocol_version: Version
-
-    def connect(self, timeout: float) -> None: ...
-    def update_sync(self) -> None: ...
-    def shutdown(self) -> None: ...
 
 
 class NatNetSource(AltitudeSource):
@@ -90,13 +58,13 @@ class NatNetSource(AltitudeSource):
         self._thread.join()
         self._client.shutdown()
 
-    def _connect(self) -> _Client:
+    def _connect(self) -> NatNetClient:
         try:
             server = socket.gethostbyname(self._address.host)
             local = self._address.local or _interface_towards(server, self._address.command_port)
         except OSError as error:
             raise _unreachable(self._address, f"there is no route to it: {error.strerror or error}") from error
-        client: _Client = NatNetClient(
+        client = NatNetClient(
             server_ip_address=server,
             local_ip_address=local,
             multicast_address=self._address.multicast,
@@ -118,7 +86,7 @@ class NatNetSource(AltitudeSource):
 
     def _await_body(self) -> None:
         version = self._client.protocol_version
-        if version < _FIRST_WITH_TRACKING:
+        if version is None or version < _FIRST_WITH_TRACKING:
             raise VehicleError(
                 f"The motion capture at {self._address.host} streams NatNet {version}, which does not report whether "
                 f"a body is tracked.",
@@ -128,18 +96,16 @@ class NatNetSource(AltitudeSource):
         while self.newest is None and time.monotonic() < until_s:
             self._process_data()
             time.sleep(POLL_S)
-        if self.newest is None:
-            raise self._absent()
-
-    def _absent(self) -> VehicleError:
+        if self.newest is not None:
+            return
         if self._frame_s is None:
-            return VehicleError(
+            raise VehicleError(
                 f"The motion capture at {self._address.host} answers, but sent no frames within {SEEN_WITHIN_S:g} s.",
                 hint="Check that Motive streams live, to the multicast group (or unicast) and over the interface that "
                 "the address names: &multicast=GROUP or no, &local=ADDRESS of this computer.",
             )
         streamed = ", ".join(map(str, sorted(self._streamed_bodies))) or "none"
-        return VehicleError(
+        raise VehicleError(
             f"The motion capture at {self._address.host} streams no rigid body {self._address.body}; it streams these "
             f"ids: {streamed}.",
             hint="Use the streaming id that Motive shows with the body, as ?body=ID, and check that it is enabled.",
@@ -154,7 +120,7 @@ class NatNetSource(AltitudeSource):
         with contextlib.suppress(OSError, *_GARBLED):
             self._client.update_sync()
 
-    def _on_frame(self, frame: _Frame) -> None:
+    def _on_frame(self, frame: DataFrame) -> None:
         self._frame_s = time.monotonic()
         for body in frame.rigid_bodies:
             self._streamed_bodies.add(body.id_num)

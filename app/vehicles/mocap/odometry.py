@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.dialects import COMMON, Message, is_known, number
@@ -37,9 +36,7 @@ def _vision(message: Message) -> Pose:
     return Pose(number(message, "usec") / 1e6, -values[2], values, tracking_valid=True)
 
 
-READERS: Final[Mapping[str, Callable[[Message], Pose]]] = MappingProxyType(
-    {"ODOMETRY": _odometry, "VISION_POSITION_ESTIMATE": _vision}
-)
+READERS: Final[Mapping[str, Callable[[Message], Pose]]] = {"ODOMETRY": _odometry, "VISION_POSITION_ESTIMATE": _vision}
 
 
 class OdometrySource(AltitudeSource):
@@ -126,7 +123,7 @@ class StreamSource(OdometrySource):
         codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT) if is_unknown else self._codec
         messages = [message for message in codec.parse(data) if is_known(message)]
         if is_unknown and any(message.get_type() in READERS for message in messages):
-            self._transport.adopt(peer)
+            self._transport.remote = peer
         now_s = self._clock.now_s()
         for message in messages:
             super().on_message(Received(message, now_s))

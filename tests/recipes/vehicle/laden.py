@@ -19,7 +19,6 @@ LADEN: Final = VehicleKind(
     title="Laden twin",
     line="The twin with a load, which hovers with more thrust.",
     is_real=False,
-    can_fly=True,
     experiments=("takeoff",),
     options=(Option("scatter", "Flight-to-flight scatter", 1.0, "×", 0.0, 5.0),),
     open=opener("laden", _launch),

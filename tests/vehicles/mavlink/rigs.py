@@ -27,7 +27,7 @@ from app.simdrone.drone import Drone
 from app.simdrone.motion_capture import open_outlet
 from app.vehicles import registry as open_module
 from app.vehicles.base import Identity, OptionValue
-from app.vehicles.mavlink.addresses import UdpAddress, parse
+from app.vehicles.mavlink.addresses import Address, parse
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -197,7 +197,7 @@ class UdpRig(_Heard):
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
         self.drone = switched_on(autopilot, options={"scatter": 0.0}, faults=faults, outlet=self._outlet)
         self._ports = free_port(), free_port()
-        self._transport: Transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
+        self._transport: Transport = open_transport(Address("udp", LOOPBACK, self._ports[0], self._ports[1]))
         self.problem: BaseException | None = None
         self._lookers: dict[threading.Thread, bool] = {}
         self._stopping = threading.Event()
@@ -235,7 +235,7 @@ class UdpRig(_Heard):
     # ---- the ground side
 
     def options(self, **options: OptionValue) -> dict[str, OptionValue]:
-        address = str(UdpAddress(LOOPBACK, self._ports[1], self._ports[0]))
+        address = str(Address("udp", LOOPBACK, self._ports[1], self._ports[0]))
         chosen = {"autopilot": self.autopilot, "address": address, "simulated": True, **options}
         return MAVLINK.check(chosen, field="options")
 

@@ -5,7 +5,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from app.autopilots.dialects import Dialect, FieldValue, Message
-from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.link import Link, Received
 from tests.ports import free_port
 from tests.waiting import Waits, wait_for
@@ -47,14 +47,14 @@ class FakeVehicleEndpoint:
         return port
 
     @property
-    def address(self) -> UdpAddress:
+    def address(self) -> Address:
         """Where a ground station reaches it, speaking from the one port that it sends to."""
-        return UdpAddress(LOOPBACK, self.port, self.ground[1])
+        return Address("udp", LOOPBACK, self.port, self.ground[1])
 
     @property
-    def ground_address(self) -> UdpInAddress:
+    def ground_address(self) -> Address:
         """Where a ground station waits for it."""
-        return UdpInAddress(*self.ground)
+        return Address("udpin", *self.ground)
 
     def frame(self, kind: str, **fields: FieldValue) -> bytes:
         return self.codec.pack(self.dialect.message(kind, fields))

@@ -3,24 +3,16 @@
 import pytest
 
 from app.core.errors import InputError
-from app.vehicles.mavlink.addresses import (
-    Address,
-    SerialAddress,
-    TcpAddress,
-    UdpAddress,
-    UdpInAddress,
-    is_loopback,
-    parse,
-)
+from app.vehicles.mavlink.addresses import Address, is_loopback, parse
 
 WRITTEN: dict[str, Address] = {
-    "udp:192.168.1.1:4245@4244": UdpAddress("192.168.1.1", 4245, 4244),
-    "udp:drone.local:14550": UdpAddress("drone.local", 14550, None),
-    "udpin:0.0.0.0:14550": UdpInAddress("0.0.0.0", 14550),
-    "tcp:127.0.0.1:5760": TcpAddress("127.0.0.1", 5760),
-    "serial:/dev/ttyUSB0:57600": SerialAddress("/dev/ttyUSB0", 57600),
-    "serial:/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:115200": SerialAddress(
-        "/dev/serial/by-path/pci-0000:00:14.0-usb-0:2", 115200
+    "udp:192.168.1.1:4245@4244": Address("udp", "192.168.1.1", 4245, 4244),
+    "udp:drone.local:14550": Address("udp", "drone.local", 14550, None),
+    "udpin:0.0.0.0:14550": Address("udpin", "0.0.0.0", 14550),
+    "tcp:127.0.0.1:5760": Address("tcp", "127.0.0.1", 5760),
+    "serial:/dev/ttyUSB0:57600": Address("serial", "/dev/ttyUSB0", 57600),
+    "serial:/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:115200": Address(
+        "serial", "/dev/serial/by-path/pci-0000:00:14.0-usb-0:2", 115200
     ),
 }
 

@@ -40,13 +40,13 @@ def slide(walk: TrialDriver) -> TrialDriver:
 def test_motors_off_is_sent_at_once_in_every_state_and_aborts_a_trial_that_had_not_failed(state: State) -> None:
     """Seen: after a lost link it made the flight an aborted one, which counted against its gains."""
     walk = STAGES[state]()
-    failed = (walk.trial.failure, walk.trial.outcome)
+    failed = (walk.trial.failure, walk.outcome)
     slid_s = walk.now_s
     slide(walk)
     assert walk.when(Action.KILL) == [slid_s]
     assert walk.state is (State.RESTORE if state is State.RESTORE else State.DISARM)
     expected = failed if failed[0] is not None else (Failure.OPERATOR, "aborted")
-    assert (walk.trial.failure, walk.trial.outcome) == expected
+    assert (walk.trial.failure, walk.outcome) == expected
     assert walk.trial.request == SLIDE or walk.trial.remarks[-1] == request_text(SLIDE)
 
 
@@ -62,9 +62,9 @@ def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_say
 
 def test_a_vehicle_whose_motors_were_stopped_on_the_ground_may_fly_again() -> None:
     walk = slide(STAGES[State.LAND]().touch_down().pass_s(0.2)).disarm().restore()
-    assert (walk.state, walk.trial.outcome) == (State.IDLE, "aborted")
+    assert (walk.state, walk.outcome) == (State.IDLE, "aborted")
     before_takeoff = slide(STAGES[State.ARM]()).disarm().restore()
-    assert (before_takeoff.state, before_takeoff.trial.outcome) == (State.IDLE, "aborted")
+    assert (before_takeoff.state, before_takeoff.outcome) == (State.IDLE, "aborted")
 
 
 def test_a_vehicle_whose_motors_were_stopped_while_it_was_not_heard_is_to_be_inspected() -> None:
@@ -156,7 +156,7 @@ def test_two_sources_that_disagree_for_a_third_of_a_second_land_the_vehicle() ->
     walk = watched(hovering(), 0.28, off_m=0.35)
     assert walk.state is State.RECORD
     watched(walk, 0.1, off_m=0.35)
-    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.DISAGREEMENT, "invalid")
+    assert (walk.state, walk.trial.failure, walk.outcome) == (State.ABORT_LAND, Failure.DISAGREEMENT, "invalid")
     assert walk.gains_sent == []
 
 
@@ -222,7 +222,7 @@ def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> N
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
     walk.through(State.RECORD)
     walk.touch_down().disarm().restore()
-    assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
+    assert (walk.state, walk.outcome) == (State.IDLE, "invalid")
 
 
 def test_the_mode_from_before_the_command_and_one_heartbeat_after_it_are_no_pilot() -> None:
@@ -300,7 +300,7 @@ def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_reco
         walk.pass_s(STEP_S)
     assert walk.trial.failure is failure
     walk.pass_s(0.5).touch_down().disarm().restore()
-    assert walk.trial.outcome == (None if failure is None else "invalid")
+    assert walk.outcome == (None if failure is None else "invalid")
 
 
 def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -> None:

@@ -203,7 +203,7 @@ def test_every_failure_in_every_phase_leads_where_it_must_and_no_set_point_follo
 def test_a_set_point_that_is_refused_or_never_confirmed_lands_the_vehicle() -> None:
     walk = unconfirmed()
     walk.give(ActionRefused(Action.FLY_TO, "Refused, or never replied to.", walk.now_s))
-    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.SET_POINT, "invalid")
+    assert (walk.state, walk.trial.failure, walk.outcome) == (State.ABORT_LAND, Failure.SET_POINT, "invalid")
     assert (walk.actions[-1], walk.gains_sent) == (Action.LAND, [])
     assert walk.pass_s(8.0).altitudes == [2.0]
 
@@ -257,7 +257,7 @@ def test_a_manual_mode_between_two_set_points_ends_them_at_once() -> None:
 def test_a_stream_that_paused_lands_the_vehicle_unless_a_pilot_may_be_flying() -> None:
     walk = hovering(7.0)
     walk.give(SetPointsPaused(0.8, walk.now_s))
-    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.PAUSED, "invalid")
+    assert (walk.state, walk.trial.failure, walk.outcome) == (State.ABORT_LAND, Failure.PAUSED, "invalid")
     walk = hovering(7.0)
     walk.hear(Heartbeat(9, armed=True, mode="64"))
     walk.give(SetPointsPaused(0.8, walk.now_s))
@@ -278,7 +278,7 @@ def test_a_vehicle_that_is_not_at_rest_before_the_first_step_is_landed() -> None
     walk.climb_rate_m_s = 0.2
     walk.until_s(6.1)
     assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.NOT_SETTLED, [])
-    assert (walk.gains_sent[0], walk.trial.outcome) == (SAFE_GAINS[0], "invalid")
+    assert (walk.gains_sent[0], walk.outcome) == (SAFE_GAINS[0], "invalid")
     assert climbing().until_s(6.1).trial.failure is Failure.NOT_SETTLED
 
 

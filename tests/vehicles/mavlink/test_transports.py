@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress, UdpAddress, UdpInAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.transports import BACKLOG, LinkError, Transport, open_transport
 from tests.ports import free_port
 from tests.vehicles.mavlink.speaking import LOOPBACK
@@ -43,7 +43,7 @@ def vehicle() -> Iterator[socket.socket]:
 def test_a_datagram_comes_with_its_sender_and_what_is_written_goes_to_the_vehicle(vehicle: socket.socket) -> None:
     local = free_port()
     with (
-        closing(open_transport(UdpAddress(LOOPBACK, vehicle.getsockname()[1], local))) as transport,
+        closing(open_transport(Address("udp", LOOPBACK, vehicle.getsockname()[1], local))) as transport,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
     ):
         stranger.sendto(b"stranger", (LOOPBACK, local))
@@ -57,7 +57,7 @@ def test_a_datagram_comes_with_its_sender_and_what_is_written_goes_to_the_vehicl
 def test_a_vehicle_that_is_not_there_yet_is_no_error(vehicle: socket.socket) -> None:
     """The operating system reports "port unreachable"; a drone that boots later must be heard all the same."""
     port, local = free_port(), free_port()
-    with closing(open_transport(UdpAddress(LOOPBACK, port, local))) as transport:
+    with closing(open_transport(Address("udp", LOOPBACK, port, local))) as transport:
         for _ in range(3):
             transport.write(b"anybody?")
             assert transport.read(0.01) == []
@@ -70,7 +70,7 @@ def test_a_vehicle_that_is_not_there_yet_is_no_error(vehicle: socket.socket) -> 
 def test_at_our_own_address_nobody_is_written_to_until_one_is_adopted(vehicle: socket.socket) -> None:
     local = free_port()
     with (
-        closing(open_transport(UdpInAddress(LOOPBACK, local))) as transport,
+        closing(open_transport(Address("udpin", LOOPBACK, local))) as transport,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
     ):
         assert transport.remote is None
@@ -78,7 +78,7 @@ def test_at_our_own_address_nobody_is_written_to_until_one_is_adopted(vehicle: s
         stranger.sendto(b"one", (LOOPBACK, local))
         vehicle.sendto(b"two", (LOOPBACK, local))
         assert hear(transport, 6) == b"onetwo"
-        transport.adopt(vehicle.getsockname())
+        transport.remote = vehicle.getsockname()
         stranger.sendto(b"three", (LOOPBACK, local))
         vehicle.sendto(b"four", (LOOPBACK, local))
         assert hear(transport, 9) == b"threefour"
@@ -88,30 +88,30 @@ def test_at_our_own_address_nobody_is_written_to_until_one_is_adopted(vehicle: s
 
 def test_a_port_that_another_program_listens_at_is_refused(vehicle: socket.socket) -> None:
     with pytest.raises(LinkError, match="Address already in use") as refusal:
-        open_transport(UdpInAddress(*vehicle.getsockname()))
+        open_transport(Address("udpin", *vehicle.getsockname()))
     assert "no other program" in refusal.value.hint
 
 
 def test_a_host_without_an_address_is_refused() -> None:
     with pytest.raises(LinkError, match=r"udp:drone\.invalid:4245 could not be opened"):
-        open_transport(UdpAddress("drone.invalid", 4245))
+        open_transport(Address("udp", "drone.invalid", 4245))
 
 
 def test_a_network_that_takes_nothing_is_no_error() -> None:
-    with closing(open_transport(UdpAddress("255.255.255.255", 4245))) as transport:  # broadcasting was not asked for
+    with closing(open_transport(Address("udp", "255.255.255.255", 4245))) as transport:  # broadcasts were not asked for
         assert not transport.write(b"command")
 
 
 def test_a_burst_is_read_to_its_last_datagram(vehicle: socket.socket) -> None:
     local = free_port()
-    with closing(open_transport(UdpAddress(LOOPBACK, vehicle.getsockname()[1], local))) as transport:
+    with closing(open_transport(Address("udp", LOOPBACK, vehicle.getsockname()[1], local))) as transport:
         for number in range(1000):
             vehicle.sendto(b"%04d" % number, (LOOPBACK, local))
         assert hear(transport, 4000) == b"".join(b"%04d" % number for number in range(1000))
 
 
 def test_a_reader_that_waits_is_woken_by_another_thread() -> None:
-    with closing(open_transport(UdpInAddress(LOOPBACK, free_port()))) as transport:
+    with closing(open_transport(Address("udpin", LOOPBACK, free_port()))) as transport:
         reader = threading.Thread(target=transport.read, args=(2 * Waits.at_most_s,))
         reader.start()
         transport.wake()
@@ -124,7 +124,7 @@ def test_a_reader_that_waits_is_woken_by_another_thread() -> None:
 
 def test_a_broken_connection_is_silence_until_it_is_open_again() -> None:
     with socket.create_server((LOOPBACK, 0)) as server:
-        address = TcpAddress(LOOPBACK, server.getsockname()[1])
+        address = Address("tcp", LOOPBACK, server.getsockname()[1])
         with closing(open_transport(address)) as transport:
             first, _ = server.accept()
             first.sendall(b"first")
@@ -146,14 +146,14 @@ def test_a_broken_connection_is_silence_until_it_is_open_again() -> None:
 
 def test_a_vehicle_that_takes_no_connections_is_refused() -> None:
     with pytest.raises(LinkError, match="Connection refused"):
-        open_transport(TcpAddress(LOOPBACK, free_port()))
+        open_transport(Address("tcp", LOOPBACK, free_port()))
 
 
 def test_writing_never_waits_for_a_peer_that_does_not_read() -> None:
     """What was taken arrives whole and in order; the rest is refused rather than sent much later."""
     with (
         socket.create_server((LOOPBACK, 0)) as server,
-        closing(open_transport(TcpAddress(LOOPBACK, server.getsockname()[1]))) as transport,
+        closing(open_transport(Address("tcp", LOOPBACK, server.getsockname()[1]))) as transport,
     ):
         peer, _ = server.accept()
         taken = bytearray()
@@ -192,7 +192,7 @@ def plugged(name: Path) -> tuple[int, Path]:
 def test_a_serial_line_carries_every_byte_both_ways(line: tuple[int, Path]) -> None:
     vehicle, device = line
     everything = bytes(range(256))
-    with closing(open_transport(SerialAddress(str(device), 57600))) as transport:
+    with closing(open_transport(Address("serial", str(device), 57600))) as transport:
         os.write(vehicle, everything)
         assert hear(transport, 256) == everything
         assert transport.remote == (str(device), 57600)
@@ -203,7 +203,7 @@ def test_a_serial_line_carries_every_byte_both_ways(line: tuple[int, Path]) -> N
 
 def test_a_radio_that_is_pulled_out_and_put_back_is_heard_again(tmp_path: Path) -> None:
     vehicle, device = plugged(tmp_path / "ttyRadio")
-    with closing(open_transport(SerialAddress(str(device), 57600))) as transport:
+    with closing(open_transport(Address("serial", str(device), 57600))) as transport:
         os.write(vehicle, b"before")
         assert hear(transport, 6) == b"before"
         os.close(vehicle)
@@ -217,7 +217,7 @@ def test_a_radio_that_is_pulled_out_and_put_back_is_heard_again(tmp_path: Path) 
 def test_a_radio_that_stays_away_is_tried_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.vehicles.mavlink.transports.REOPEN_EVERY_S", 0.02)
     vehicle, device = plugged(tmp_path / "ttyRadio")
-    with closing(open_transport(SerialAddress(str(device), 57600))) as transport:
+    with closing(open_transport(Address("serial", str(device), 57600))) as transport:
         os.close(vehicle)
         device.unlink()
         assert not transport.write(b"lost")  # before the reader has noticed
@@ -232,7 +232,7 @@ def test_a_radio_that_stays_away_is_tried_again_and_again(tmp_path: Path, monkey
 
 def test_a_radio_that_was_pulled_out_can_be_closed(tmp_path: Path) -> None:
     vehicle, device = plugged(tmp_path / "ttyRadio")
-    transport = open_transport(SerialAddress(str(device), 57600))
+    transport = open_transport(Address("serial", str(device), 57600))
     os.close(vehicle)
     eventually(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
     transport.close()
@@ -240,9 +240,9 @@ def test_a_radio_that_was_pulled_out_can_be_closed(tmp_path: Path) -> None:
 
 def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="No such file"):
-        open_transport(SerialAddress(str(tmp_path / "ttyUSB0"), 57600))
+        open_transport(Address("serial", str(tmp_path / "ttyUSB0"), 57600))
 
 
 def test_a_baud_rate_of_no_device_is_refused(line: tuple[int, Path]) -> None:
     with pytest.raises(LinkError, match="could not be opened"):
-        open_transport(SerialAddress(str(line[1]), 10**12))
+        open_transport(Address("serial", str(line[1]), 10**12))

@@ -346,7 +346,7 @@ def test_a_flight_goes_through_its_states_and_ends_idle() -> None:
         State.IDLE,
     ]
     assert walk.actions == [Action.ARM, Action.TAKE_OFF, Action.LAND, Action.MOTORS_OFF]
-    assert (walk.trial.failure, walk.trial.outcome) == (None, None)
+    assert (walk.trial.failure, walk.outcome) == (None, None)
     assert walk.gains_sent == []
     assert RestoreGains() in [command for _, command in walk.told]
 
@@ -520,7 +520,7 @@ def test_a_refused_arming_disarms_and_restores_the_gains() -> None:
     walk.give(ActionRefused(Action.ARM, "The vehicle refused to arm (result 4, failed).", walk.now_s))
     assert (walk.state, walk.actions) == (State.DISARM, [Action.ARM, Action.MOTORS_OFF])
     walk.disarm().restore()
-    assert (walk.state, walk.trial.outcome) == (State.IDLE, "refused")
+    assert (walk.state, walk.outcome) == (State.IDLE, "refused")
 
 
 def test_a_vehicle_that_does_not_report_armed_is_not_flown() -> None:
@@ -534,7 +534,7 @@ def test_a_vehicle_that_does_not_land_within_40_s_is_quarantined() -> None:
     walk = recording()
     press_abort(walk)
     walk.pass_s(40.1)
-    assert (walk.state, walk.trial.outcome) == (State.QUARANTINE, "quarantine")
+    assert (walk.state, walk.outcome) == (State.QUARANTINE, "quarantine")
     assert "not landed within 40 s" in walk.trial.why
 
 
@@ -582,7 +582,7 @@ def test_one_heartbeat_of_a_failsafe_decides_nothing() -> None:
     walk.hear(message)
     walk.through(State.RECORD)
     walk.does(0.5, climb_rate_m_s=-0.8).touch_down().disarm().restore()
-    assert (walk.state, walk.trial.outcome) == (State.IDLE, None)
+    assert (walk.state, walk.outcome) == (State.IDLE, None)
 
 
 @pytest.mark.complete
@@ -643,7 +643,7 @@ def test_a_descent_that_was_none_does_not_count_against_the_gains() -> None:
     walk.does(1.2, altitude_m=GROUND_M + 0.05, climb_rate_m_s=0.0, landed=True)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
     walk.does(0.2, altitude_m=2.9)
-    assert (walk.state, walk.trial.outcome) == (State.ABORT_LAND, "invalid")
+    assert (walk.state, walk.outcome) == (State.ABORT_LAND, "invalid")
 
 
 def test_a_vehicle_whose_altitude_jumped_by_metres_is_not_said_to_be_safe_though_it_disarms_itself() -> None:
@@ -704,7 +704,7 @@ def test_the_motors_are_stopped_only_when_what_the_vehicle_says_of_itself_agrees
     walk.touch_down()
     assert (walk.state is State.DISARM, Action.MOTORS_OFF in walk.actions) == (says_so, says_so)
     assert walk.trial.failure is Failure.LOST_POSITION, "it said that it stood, or flew, while its altitude did not"
-    assert walk.trial.outcome == ("invalid" if says_so else "quarantine")
+    assert walk.outcome == ("invalid" if says_so else "quarantine")
 
 
 def test_a_vehicle_that_falls_is_recorded_so_and_left_for_a_person_to_look_at() -> None:
@@ -754,7 +754,7 @@ def test_glitches_do_not_end_a_flight_but_too_many_void_it() -> None:
         walk.pass_s(0.5)
     assert walk.states[-1] is State.RECORD
     walk.through(State.RECORD)
-    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.LAND, Failure.GLITCHES, "invalid")
+    assert (walk.state, walk.trial.failure, walk.outcome) == (State.LAND, Failure.GLITCHES, "invalid")
     assert walk.trial.watch.positions.glitches == 4
 
 

@@ -30,6 +30,7 @@ from app.vehicles.mavlink.events import (
     SendGain,
     Tick,
 )
+from app.vehicles.mavlink.failures import RESPONSES, Outcome
 from app.vehicles.mavlink.monitors.clock import WRAP_S
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
@@ -110,6 +111,16 @@ class TrialDriver:
     @property
     def state(self) -> State:
         return self.trial.state
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the trial and its vehicle end, by the table; None without a failure."""
+        if self.state is State.QUARANTINE:
+            return "quarantine"
+        if self.trial.failure is None:
+            return None
+        known = RESPONSES[self.trial.failure].outcome
+        return "invalid" if known == "quarantine" else known
 
     @property
     def actions(self) -> list[Action]:

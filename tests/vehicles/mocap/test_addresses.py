@@ -1,7 +1,7 @@
 import pytest
 
 from app.core.errors import InputError
-from app.vehicles.mavlink.addresses import UdpInAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, SourceAddress, StreamAddress, parse
 
 
@@ -18,7 +18,7 @@ from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, SourceA
             ),
         ),
         ("odometry", OdometryAddress()),
-        ("mavlink:udpin:0.0.0.0:14600", StreamAddress(UdpInAddress("0.0.0.0", 14600))),
+        ("mavlink:udpin:0.0.0.0:14600", StreamAddress(Address("udpin", "0.0.0.0", 14600))),
     ],
 )
 def test_a_source_is_written_as_one_text(text: str, address: SourceAddress) -> None:

@@ -10,7 +10,7 @@ import pytest
 from app.autopilots.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, FieldValue
 from app.core.clock import ScaledClock
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink_kind import open_source
@@ -89,7 +89,7 @@ def test_a_link_without_odometry_is_troubled(monkeypatch: pytest.MonkeyPatch, ow
 
 def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
     port = free_port()
-    with FakeMotive(StreamAddress(UdpAddress(LOOPBACK, port))) as motive:
+    with FakeMotive(StreamAddress(Address("udp", LOOPBACK, port))) as motive:
         motive.altitude_m = 1.2
         with closing(open_source(f"mavlink:udpin:{LOOPBACK}:{port}", CLOCK)) as source:
             eventually(lambda: any(sample.altitude_m > 1.1 for sample in source.take()))
@@ -107,9 +107,9 @@ def test_a_stranger_on_the_port_is_not_taken_for_the_motion_capture() -> None:
     port = free_port()
     with socket.socket(type=socket.SOCK_DGRAM) as stranger:
         chatter = COMMON.codec(system=9, component=9).pack(COMMON.message("STATUSTEXT", {"severity": 6, "text": "hi"}))
-        with FakeMotive(StreamAddress(UdpAddress(LOOPBACK, port))):
+        with FakeMotive(StreamAddress(Address("udp", LOOPBACK, port))):
             stranger.sendto(chatter, (LOOPBACK, port))
-            with closing(StreamSource(StreamAddress(UdpInAddress(LOOPBACK, port)), CLOCK)) as source:
+            with closing(StreamSource(StreamAddress(Address("udpin", LOOPBACK, port)), CLOCK)) as source:
                 stranger.sendto(b"\xff" * 40, (LOOPBACK, port))
                 source.take()
                 eventually(lambda: any(sample.advances for sample in source.take()))

@@ -42,14 +42,14 @@ _APART_S: Final = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class PositionMonitor:
-    """`last` is the last plausible position: received at `accepted_s`, and sent at `sent_s` if its latency above the
-    least one is delay; `doubted` a later one in doubt. `jumped_m` is the greatest jump after which the altitude has
-    continued from another value, `unchanged_s` the time by the vehicle's clock in which neither altitude nor climb rate
-    has changed at all."""
+    """`last` is the last plausible position, at first where the vehicle stood: received at `accepted_s`, and sent
+    at `sent_s` if its latency above the least one is delay; `doubted` a later one in doubt. `jumped_m` is the greatest
+    jump after which the altitude has continued from another value, `unchanged_s` the time by the vehicle's clock in
+    which neither altitude nor climb rate has changed at all."""
 
     accepted_s: float
     sent_s: float
-    last: Position | None = None
+    last: Position
     doubted: Position | None = None
     glitches: int = 0
     doubt_level: float = 0.0
@@ -62,11 +62,11 @@ class PositionMonitor:
         """Return the state after a position that continues the vehicle's clock, `quiet_s` after the previous one, and
         the positions that it confirms."""
         last, doubted, jumped_m = self.last, self.doubted, self.jumped_m
-        follows = last is None or _follows(last, position)
+        follows = _follows(last, position)
         level = max(self.doubt_level - _DOUBT_DECAY_1_S * quiet_s, 0.0) + (not follows)
         glitches = self.glitches + (doubted is not None)
         confirmed: tuple[Position, ...] = (position,)
-        if last is not None and not follows:
+        if not follows:
             if doubted is None or not _follows(doubted, position):
                 return replace(self, doubted=position, doubt_level=level, glitches=glitches), ()
             glitches, confirmed = self.glitches, (doubted, position)
@@ -90,14 +90,14 @@ class PositionMonitor:
 
     def _unchanged_s(self, position: Position) -> float:
         last = self.last
-        if last is None or (last.altitude_m, last.climb_rate_m_s) != (position.altitude_m, position.climb_rate_m_s):
+        if (last.altitude_m, last.climb_rate_m_s) != (position.altitude_m, position.climb_rate_m_s):
             return 0.0
         return self.unchanged_s + position.time_boot_s - last.time_boot_s
 
     # ---- what the newest plausible position shows
 
     def is_fresh(self, now_s: float) -> bool:
-        return self.last is not None and now_s - self.sent_s < FRESH_S
+        return now_s - self.sent_s < FRESH_S
 
     def is_in_doubt(self, now_s: float) -> bool:
         """Whether a single sample jumps, which decides nothing."""
@@ -105,9 +105,8 @@ class PositionMonitor:
 
     def is_still(self, now_s: float, ground_m: float, *, within_m: float = DRIFT_M) -> bool:
         """Whether it neither climbs nor sinks within `within_m` of the ground, by a fresh sample."""
-        last = self.last
-        low = last is not None and last.altitude_m - ground_m < within_m
-        return low and last is not None and self.is_fresh(now_s) and abs(last.climb_rate_m_s) < RESTING_M_S
+        is_low = self.height_m(ground_m) < within_m
+        return is_low and self.is_fresh(now_s) and abs(self.last.climb_rate_m_s) < RESTING_M_S
 
     def is_grounded(self, now_s: float, ground_m: float) -> bool:
         """Whether it is on the ground by height and speed, by a fresh sample."""
@@ -115,17 +114,16 @@ class PositionMonitor:
 
     def is_airborne(self, now_s: float, ground_m: float) -> bool:
         """Whether it is above the ground, by the altitude of a fresh sample."""
-        return self.last is not None and self.is_fresh(now_s) and self.last.altitude_m - ground_m > GROUND_M
+        return self.is_fresh(now_s) and self.height_m(ground_m) > GROUND_M
 
-    def height_m(self, ground_m: float) -> float | None:
-        return None if self.last is None else self.last.altitude_m - ground_m
+    def height_m(self, ground_m: float) -> float:
+        return self.last.altitude_m - ground_m
 
     # ---- findings
 
     def find_glitches(self) -> Finding | None:
-        if self.glitches <= _MAX_GLITCHES:
-            return None
-        return Finding(Failure.GLITCHES, f"{self.glitches} samples were dropped.")
+        why = f"{self.glitches} samples were dropped."
+        return Finding(Failure.GLITCHES, why) if self.glitches > _MAX_GLITCHES else None
 
     def find_frozen(self) -> Finding | None:
         why = f"Its altitude stood still for more than {_UNCHANGED_S:g} s while its clock ran."
@@ -134,9 +132,8 @@ class PositionMonitor:
     def find_implausible(self, plan: Plan, received_s: float, now_s: float) -> Finding | None:
         """Find that none is plausible; to be called after a lost link was looked for, because silence is one."""
         lost_s = LOST_S * plan.timeout_factor
-        if min(now_s, received_s) - self.accepted_s <= lost_s:
-            return None
-        return Finding(Failure.LOST_POSITION, f"None of its positions was plausible for {lost_s:g} s.")
+        why = f"None of its positions was plausible for {lost_s:g} s."
+        return Finding(Failure.LOST_POSITION, why) if min(now_s, received_s) - self.accepted_s > lost_s else None
 
     def find_unreliable(self) -> Finding | None:
         why = "Its position jumps back and forth."
@@ -144,14 +141,14 @@ class PositionMonitor:
 
     def find_jump(self) -> Finding | None:
         """Find a jump of the altitude in flight: it, or the earlier altitude, is not the vehicle's."""
-        if self.jumped_m <= _JUMP_ENDS_RECORD_M:
-            return None
-        return Finding(Failure.LOST_POSITION, f"Its altitude jumped by {self.jumped_m:.1f} m.")
+        why = f"Its altitude jumped by {self.jumped_m:.1f} m."
+        return Finding(Failure.LOST_POSITION, why) if self.jumped_m > _JUMP_ENDS_RECORD_M else None
 
     def find_departure(self, ground_m: float, *, stands: bool) -> Finding | None:
         """Find that a vehicle without a takeoff command may have left the ground, by its altitude, or that its altitude
         drifts while it reports that it `stands`."""
-        if self.last is None or abs(away_m := self.last.altitude_m - ground_m) <= GROUND_M:
+        away_m = self.height_m(ground_m)
+        if abs(away_m) <= GROUND_M:
             return None
         what = "although it stood on the ground: wait until its estimate has settled"
         what = what if stands else "and it may have moved"
@@ -161,22 +158,19 @@ class PositionMonitor:
     def find_drift(self, now_s: float, ground_m: float, *, has_landed: bool) -> Finding | None:
         """Find that the altitude of a flown vehicle has drifted: it is below the ground, or above it where the vehicle
         reports that it has landed."""
-        if self.last is None or self.doubted is not None or not self.is_fresh(now_s):
+        off_m = self.height_m(ground_m)
+        if self.doubted is not None or not self.is_fresh(now_s):
             return None
-        off_m = self.last.altitude_m - ground_m
         if off_m >= -DRIFT_M and not (off_m > DRIFT_M and has_landed):
             return None
         return Finding(Failure.LOST_POSITION, f"Its altitude has drifted: it was {off_m:+.1f} m on the ground.")
 
     def find_fall(self, ground_m: float) -> Finding | None:
         """Find ground contact at a speed above that of any landing."""
-        last = self.last
-        if last is None or self.doubted is not None:
+        is_near, rate_m_s = self.height_m(ground_m) < _IMPACT_BELOW_M, self.last.climb_rate_m_s
+        if self.doubted is not None or not is_near or rate_m_s >= -_IMPACT_M_S:
             return None
-        near = last.altitude_m - ground_m < _IMPACT_BELOW_M
-        if not near or last.climb_rate_m_s >= -_IMPACT_M_S:
-            return None
-        return Finding(Failure.FALL, f"It hit the ground at {-last.climb_rate_m_s:.1f} m/s.")
+        return Finding(Failure.FALL, f"It hit the ground at {-rate_m_s:.1f} m/s.")
 
 
 def _follows(one: Position, other: Position) -> bool:
@@ -249,6 +243,5 @@ class SecondSourceMonitor:
         """Find a disagreement between the vehicle's altitude on the ground and the source's last one before a shift."""
         second_m = self.altitude_at(now_s)
         apart_m = 0.0 if second_m is None else abs(second_m + ground_shift_m - altitude_m)
-        if apart_m <= MAX_DIFFERENCE_M:
-            return None
-        return Finding(Failure.DISAGREEMENT, f"They were {apart_m:.2f} m apart before the takeoff command.")
+        why = f"They were {apart_m:.2f} m apart before the takeoff command."
+        return Finding(Failure.DISAGREEMENT, why) if apart_m > MAX_DIFFERENCE_M else None

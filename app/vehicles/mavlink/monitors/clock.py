@@ -130,10 +130,10 @@ class ClockMonitor:
             return position.time_boot_s - newest.time_boot_s - (now_s - self.advanced_s) - AHEAD_S
         return self.least_offset_s - (now_s - position.time_boot_s)
 
-    def find_frozen(self, plan: Plan, last: Position | None, accepted_s: float) -> Finding | None:
+    def find_frozen(self, plan: Plan, last: Position, accepted_s: float) -> Finding | None:
         """Find a clock that stands still or jumps; `last` is the last plausible position, of the time `accepted_s`."""
         why, other, stuck_s = "", self.other, STUCK_S * plan.timeout_factor
-        if self.stuck_s > stuck_s and other is not None and other.advances and last is not None:
+        if self.stuck_s > stuck_s and other is not None and other.advances:
             gained_s = other.last.time_boot_s - last.time_boot_s
             why = f"Its clock jumped by {gained_s - (other.last_s - accepted_s):+.1f} s."
         elif self.stuck_s > stuck_s:

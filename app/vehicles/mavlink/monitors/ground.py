@@ -78,18 +78,17 @@ class ClimbMonitor:
     unseen_m: float | None = None
     behind_m: float = 0.0
 
-    def update(self, last: Position | None, position: Position) -> "ClimbMonitor":
+    def update(self, last: Position, position: Position) -> "ClimbMonitor":
         """Return the state after a plausible position that follows `last`."""
         highest_m, unseen_m, behind_m = max(self.highest_m, position.altitude_m), self.unseen_m, self.behind_m
-        if last is not None:
-            passed_s = position.time_boot_s - last.time_boot_s
-            if passed_s > FRESH_S:
-                reached_m = last.altitude_m + max(last.climb_rate_m_s, 0.0) * passed_s
-                unseen_m = reached_m if unseen_m is None else max(unseen_m, reached_m)
-            if not (self.lifted or self.is_behind):
-                mean_m_s = 0.5 * (last.climb_rate_m_s + position.climb_rate_m_s)
-                climbed_m = (mean_m_s if abs(mean_m_s) > RESTING_M_S else 0.0) * passed_s
-                behind_m = behind_m + climbed_m - (position.altitude_m - last.altitude_m)
+        passed_s = position.time_boot_s - last.time_boot_s
+        if passed_s > FRESH_S:
+            reached_m = last.altitude_m + max(last.climb_rate_m_s, 0.0) * passed_s
+            unseen_m = reached_m if unseen_m is None else max(unseen_m, reached_m)
+        if not (self.lifted or self.is_behind):
+            mean_m_s = 0.5 * (last.climb_rate_m_s + position.climb_rate_m_s)
+            climbed_m = (mean_m_s if abs(mean_m_s) > RESTING_M_S else 0.0) * passed_s
+            behind_m = behind_m + climbed_m - (position.altitude_m - last.altitude_m)
         if (highest_m, unseen_m, behind_m) == (self.highest_m, self.unseen_m, self.behind_m):
             return self
         return replace(self, highest_m=highest_m, unseen_m=unseen_m, behind_m=behind_m)
@@ -125,19 +124,17 @@ class ClimbMonitor:
     def find_incomplete(self, climb_to_m: float) -> Finding | None:
         """Find at the end of a record that the vehicle has never been near its first set point. Its gains may have kept
         it low, or a change of mode that no heartbeat reported."""
-        if self.has_been_near(climb_to_m):
-            return None
         why = (
             f"It did not come within {_WITHIN_M:g} m of its set point, because of its gains or of a change of mode "
             "that no heartbeat reported."
         )
-        return Finding(Failure.INTERRUPTED, why)
+        return None if self.has_been_near(climb_to_m) else Finding(Failure.INTERRUPTED, why)
 
-    def find_sunken(self, last: Position | None, lowest_m: float, ground_m: float) -> Finding | None:
+    def find_sunken(self, last: Position, lowest_m: float, ground_m: float) -> Finding | None:
         """Find at the end of a record that the vehicle, or its altitude alone, has sunk to less than half of the lowest
         set point, where it had been near that."""
-        height_m = 0.0 if last is None else last.altitude_m - ground_m
-        swings = last is not None and abs(last.climb_rate_m_s) > _SINKING_M_S
+        height_m = last.altitude_m - ground_m
+        swings = abs(last.climb_rate_m_s) > _SINKING_M_S
         if swings or not self.has_been_near(lowest_m) or height_m >= 0.5 * (lowest_m - ground_m):
             return None
         why = f"At the end of the record it was {height_m:.1f} m above the ground: it, or its altitude alone, has sunk."

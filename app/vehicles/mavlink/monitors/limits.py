@@ -46,7 +46,7 @@ class EnvelopeMonitor:
     `leaning` is the recent share of time in which it has leaned by more than 20°, at `attitude_s` last; `breached` the
     limit of its own fence that it has crossed, empty if none."""
 
-    origin: Position | None = None
+    origin: Position
     side: int = -1
     crossings: int = 0
     may_overshoot: bool = False
@@ -57,16 +57,9 @@ class EnvelopeMonitor:
     def add_position(self, position: Position, plan: Plan) -> "EnvelopeMonitor":
         above_m = position.altitude_m - plan.set_point_m
         side = self.side if abs(above_m) <= _CROSSING_M else (1 if above_m > 0.0 else -1)
-        has_crossed = side != self.side
-        if self.origin is not None and not has_crossed:
+        if side == self.side:
             return self
-        return replace(
-            self,
-            origin=self.origin or position,
-            side=side,
-            crossings=self.crossings + (has_crossed and not self.may_overshoot),
-            may_overshoot=self.may_overshoot and not has_crossed,
-        )
+        return replace(self, side=side, crossings=self.crossings + (not self.may_overshoot), may_overshoot=False)
 
     def add_attitude(self, lean_rad: float, now_s: float) -> "EnvelopeMonitor":
         passed_s = 0.0 if self.attitude_s is None else min(now_s - self.attitude_s, _LONGEST_LEAN_S)
@@ -74,28 +67,24 @@ class EnvelopeMonitor:
         leaning = self.leaning + weight * ((abs(lean_rad) > _LEAN_RAD) - self.leaning)
         return replace(self, leaning=leaning, attitude_s=now_s)
 
-    def find(self, plan: Plan, last: Position | None, *, settling: bool) -> Finding | None:
+    def find(self, plan: Plan, last: Position, *, settling: bool) -> Finding | None:
         """Find a limit that the vehicle has exceeded; crossings of the set point count while it is `settling` there."""
-        why = ""
+        why, height_m, away_m = "", last.altitude_m - plan.ground_m, last.away_m(self.origin)
         if self.breached:
             why = f"The vehicle's own fence was crossed: {self.breached}."
-        elif last is not None and self.origin is not None:
-            away_m = last.away_m(self.origin)
-            if (height_m := last.altitude_m - plan.ground_m) > ALTITUDE_LIMIT_M:
-                why = f"It was {height_m:.2f} m above the ground; the limit is {ALTITUDE_LIMIT_M:g} m."
-            elif abs(last.climb_rate_m_s) > _CLIMB_RATE_M_S:
-                why = f"Its climb rate was {last.climb_rate_m_s:+.1f} m/s; the limit is ±{_CLIMB_RATE_M_S:g} m/s."
-            elif away_m > plan.radius_m:
-                why = f"It was {away_m:.1f} m from its start; the limit is {plan.radius_m:g} m."
-            elif settling and self.crossings >= _CROSSINGS:
-                why = f"It crossed its set point {self.crossings} times by more than ±{_CROSSING_M:g} m."
+        elif height_m > ALTITUDE_LIMIT_M:
+            why = f"It was {height_m:.2f} m above the ground; the limit is {ALTITUDE_LIMIT_M:g} m."
+        elif abs(last.climb_rate_m_s) > _CLIMB_RATE_M_S:
+            why = f"Its climb rate was {last.climb_rate_m_s:+.1f} m/s; the limit is ±{_CLIMB_RATE_M_S:g} m/s."
+        elif away_m > plan.radius_m:
+            why = f"It was {away_m:.1f} m from its start; the limit is {plan.radius_m:g} m."
+        elif settling and self.crossings >= _CROSSINGS:
+            why = f"It crossed its set point {self.crossings} times by more than ±{_CROSSING_M:g} m."
         return Finding(Failure.ENVELOPE, why) if why else self.find_oscillation()
 
     def find_oscillation(self) -> Finding | None:
-        if self.leaning <= _LEANING:
-            return None
         why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
-        return Finding(Failure.ENVELOPE, why)
+        return Finding(Failure.ENVELOPE, why) if self.leaning > _LEANING else None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -90,7 +90,7 @@ class ModeMonitor:
             why = f"Its flight plan entered the block “{self.block}”."
         return Finding(Failure.UNEXPECTED, why) if why else None
 
-    def find_own_landing(self, plan: Plan, last: Position | None, *, mode_known: bool) -> Finding | None:
+    def find_own_landing(self, plan: Plan, last: Position, *, mode_known: bool) -> Finding | None:
         """Find a landing of a vehicle that should fly. `mode_known`: its mode is not the one before the command. Close
         below our ceiling, the vehicle's own ceiling is the cause, and the failure is that of the envelope."""
         why, autopilot = "", plan.autopilot
@@ -98,7 +98,7 @@ class ModeMonitor:
             why = f"It entered mode {plan.named(self.agreed)}."
         elif self.block in autopilot.landing_blocks:
             why = f"Its flight plan entered the block “{self.block}”."
-        if not why or last is None:
+        if not why:
             return None
         if (height_m := last.altitude_m - plan.ground_m) > ALTITUDE_LIMIT_M - _OWN_CEILING_M:
             return Finding(Failure.ENVELOPE, f"It was {height_m:.2f} m above the ground. {why}")

@@ -31,7 +31,7 @@ def test_a_vehicle_that_reports_for_8_s_that_it_flies_contradicts_an_altitude_on
 
 
 def climbed(*positions: Position) -> ClimbMonitor:
-    climb = ClimbMonitor().update(None, positions[0])
+    climb = ClimbMonitor(highest_m=positions[0].altitude_m)
     for last, position in pairwise(positions):
         climb = climb.update(last, position)
     return climb
