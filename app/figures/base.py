@@ -2,14 +2,16 @@
 
 import html
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, Final, Literal, Protocol
+from typing import ClassVar, Final, Literal
 
 from pydantic import with_config
 
-from app.figures.data import Curve
+from app.figures.data import Curve, History
+from app.figures.theme import PALETTES, Palette, ThemeName
 
 Cell = str | int | float | None
 PlotlyJson = Mapping[str, object]
@@ -61,19 +63,46 @@ class Card:
     table: Table | None = None
 
 
-class Figure(Protocol):
-    """One figure over plain data, without any other input."""
+@dataclass(frozen=True, slots=True)
+class Figure(ABC):
+    """One figure over plain data, without any other input but the theme."""
 
+    theme_name: ThemeName = field(default="light", kw_only=True)
     name: ClassVar[str]
 
     @property
+    @abstractmethod
     def title(self) -> str: ...
 
     def not_ready(self) -> str | None:
         """Why there is nothing to draw yet, or None."""
-        ...
+        return None
 
+    @abstractmethod
     def compute(self) -> Card: ...
+
+    @property
+    def palette(self) -> Palette:
+        return PALETTES[self.theme_name]
+
+    def ready(self, traces: Sequence[Mapping[str, object]], *, summary: str, table: Table, **layout: object) -> Card:
+        """The card of a figure that could be drawn, with its part of the layout. The browser keeps what a person chose
+        in the figure of the same name (`uirevision`)."""
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=summary,
+            figure=plotly_json(traces, self.palette.layout(**{"uirevision": self.name, **layout})),
+            table=table,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignFigure(Figure):
+    """A figure of a campaign."""
+
+    history: History
 
 
 def card_of(figure: Figure) -> Card:
@@ -90,20 +119,6 @@ def card_of(figure: Figure) -> Card:
             state="failed",
             reason="This figure could not be drawn. No data is lost; see the server's log.",
         )
-
-
-def ready(
-    figure: Figure, traces: Sequence[Mapping[str, object]], layout: Mapping[str, object], *, summary: str, table: Table
-) -> Card:
-    """The card of a figure that could be drawn."""
-    return Card(
-        name=figure.name,
-        title=figure.title,
-        state="ready",
-        summary=summary,
-        figure=plotly_json(traces, layout),
-        table=table,
-    )
 
 
 def scatter(

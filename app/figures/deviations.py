@@ -126,10 +126,8 @@ class _Label:
 def _marks(flights: Sequence[FlightData], set_point: Curve, limit: float, window: Range) -> Iterator[_Mark]:
     """The mark of each flight that leaves the panel in the visible time range."""
     for flight in flights:
-        if flight.curve is None:
-            continue
         part = part_off_scale(after_climb(deviation_of(flight.curve, set_point), set_point), -limit, limit, window)
-        if part is not None:
+        if part:
             place = int(np.abs(part.values).argmax())
             peak = signed(float(part.values[place]), SHARED_DIGITS)
             up = leaves_upward(part.values, -limit, limit)
@@ -176,8 +174,7 @@ def _trace(palette: theme.Palette, mark: _Mark, label: _Label | None, limit: flo
 
 def deviation_axis(palette: theme.Palette, limit: float, unit: str, **more: object) -> dict[str, object]:
     """The ordinate of the panel, from −limit to limit."""
-    return theme.axis(
-        palette,
+    return palette.axis(
         f"Deviation ({unit})",
         range=[-limit, limit],
         nticks=5,

@@ -1,13 +1,12 @@
 """The gains of each flight, one small panel per gain, with the next ones as open diamonds."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from app.core import formatting
 from app.core.policy import Gain
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, ready, scatter
-from app.figures.data import History
+from app.figures.base import CampaignFigure, Card, Column, Table, Trace, scatter
 from app.figures.overlays import MANY
 
 GAP = 0.09
@@ -17,16 +16,14 @@ _LETTERS: Final = 48
 
 
 @dataclass(frozen=True, slots=True)
-class GainsFigure:
+class GainsFigure(CampaignFigure):
     """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `proposed`.
 
     Every trace carries `meta`: `role` (flown, best, next) and `gain`. A page puts other gains in the place of `next`.
     """
 
-    history: History
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "gains"
-    title: ClassVar[str] = "Gains per flight"
+    name = "gains"
+    title = "Gains per flight"
 
     def not_ready(self) -> str | None:
         if self.history.flights or self.history.proposal is not None:
@@ -34,24 +31,23 @@ class GainsFigure:
         return "The gains of each flight appear here once the first ones are proposed."
 
     def compute(self) -> Card:
-        palette, history = theme.PALETTES[self.theme_name], self.history
-        panels = list(enumerate(history.gains, start=1))
-        traces = [trace for index, gain in panels for trace in self._panel(palette, index, gain)]
+        panels = list(enumerate(self.history.gains, start=1))
+        traces = [trace for index, gain in panels for trace in self._panel(index, gain)]
         axes: dict[str, object] = {}
         for index, gain in panels:
-            axes |= self._axes(palette, index, gain)
-        layout = theme.layout(
-            palette,
+            axes |= self._axes(index, gain)
+        return self.ready(
+            traces,
+            summary=self._summary(),
+            table=self._table(),
             showlegend=False,
-            uirevision="gains",
             margin={**theme.MARGIN_PX, "t": 24, "r": 30},
-            annotations=self._names(palette),
+            annotations=self._names(),
             **axes,
         )
-        return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _panel(self, palette: theme.Palette, index: int, gain: Gain) -> list[Trace]:
-        colour = palette.gains[(index - 1) % len(palette.gains)]
+    def _panel(self, index: int, gain: Gain) -> list[Trace]:
+        colour = self.palette.gains[(index - 1) % len(self.palette.gains)]
         flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
         axes: dict[str, Any] = {**theme.on(index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
@@ -89,17 +85,16 @@ class GainsFigure:
             role="next",
             about={"gain": gain.name},
             mode="markers",
-            marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+            marker={"size": 11, "symbol": "diamond-open", "color": self.palette.prediction, "line": {"width": 2}},
             hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
             **axes,
         )
         return [*drawn, following]
 
-    def _axes(self, palette: theme.Palette, index: int, gain: Gain) -> dict[str, object]:
+    def _axes(self, index: int, gain: Gain) -> dict[str, object]:
         count = len(self.history.gains)
         values = [flight.gains[gain.name] for flight in (*self.history.flights, *self.history.next_flights)]
-        return theme.panel_axes(
-            palette,
+        return self.palette.panel_axes(
             (index, count, GAP),
             "Flight",
             theme.flight_ticks(self.history.last_number),
@@ -107,14 +102,13 @@ class GainsFigure:
             nticks=4 if count <= 3 else 3,
         )
 
-    def _names(self, palette: theme.Palette) -> list[dict[str, object]]:
+    def _names(self) -> list[dict[str, object]]:
         """Name, title and unit of each gain, above its panel; where one would not fit, the titles show under the
         pointer."""
         gains = self.history.gains
         fit = all(len(_label(gain.name, gain.title, gain)) <= _LETTERS for gain in gains)
         return [
-            theme.note(
-                palette,
+            self.palette.note(
                 _label(f"<b>{gain.name}</b>", gain.title if fit else "", gain),
                 y=theme.stacked(index, len(gains), GAP)[1],
                 hovertext=gain.title,

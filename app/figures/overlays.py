@@ -11,7 +11,7 @@ import numpy as np
 from app.core.records.trajectory import Samples
 from app.figures import theme
 from app.figures.base import Trace, reading, scatter
-from app.figures.data import Band, Curve, FlightData, History, Range
+from app.figures.data import NO_CURVE, Band, Curve, FlightData, History, Range
 from app.figures.scale import thin_by_bends, thinned
 
 GLITCH_POINTS: Final = 60
@@ -35,10 +35,10 @@ def band_traces(palette: theme.Palette, band: Band | None) -> Iterator[Trace]:
 
 
 def glitch_traces(
-    palette: theme.Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+    palette: theme.Palette, number: int, curve: Curve, glitches: Sequence[Range], unit: str
 ) -> Iterator[Trace]:
     """The glitches of a flight's record, over its curve: one trace, or none."""
-    if curve is None or not glitches:
+    if not glitches:
         return
     x: list[float | None] = []
     y: list[float | None] = []
@@ -113,12 +113,11 @@ def _alone(palette: theme.Palette, flight: FlightData, top: float, unit: str, *,
     )
 
 
-def part_off_scale(curve: Curve, low: float, high: float, window: Range) -> Curve | None:
-    """The part of a curve in the visible time range `window`, if it leaves the scale `low` … `high`; else None."""
+def part_off_scale(curve: Curve, low: float, high: float, window: Range) -> Curve:
+    """The part of a curve in the visible time range `window`, if it leaves the scale `low` … `high`; else no curve."""
     visible = (window.low <= curve.time_s) & (curve.time_s <= window.high)
     part = Curve(curve.time_s[visible], curve.values[visible])
-    leaves = len(part.values) > 0 and (part.values.max() > high or part.values.min() < low)
-    return part if leaves else None
+    return part if part and (part.values.max() > high or part.values.min() < low) else NO_CURVE
 
 
 def leaves_upward(values: Samples, low: float, high: float) -> bool:
@@ -215,8 +214,7 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
 
     Times are denser while the flights climb; after the end of a record its last value holds.
     """
-    curves = [flight.curve for flight in flights if flight.outcome == "valid" and flight.curve is not None]
-    curves = [curve for curve in curves if len(curve.time_s)]
+    curves = [flight.curve for flight in flights if flight.outcome == "valid" and flight.curve]
     if not curves:
         return None
     early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)

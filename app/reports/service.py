@@ -303,7 +303,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
         gains=experiment.space.gains,
         what=describe_vehicle(campaign, experiment, vehicle.identity, safe_gains),
         how=describe_method(campaign, experiment),
-        cards=tuple(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
+        cards=tuple(card_of(figure(past)) for figure in CAMPAIGN_FIGURES.values()),
         remarks=tuple(remarks_on(session, campaign_id, trials)),
         photo_bytes=MAX_PHOTO_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),

@@ -129,7 +129,7 @@ def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> C
     title, result = each.figures[figure_name], _result(session, name)
     if result is None or figure_name not in result.figures:
         return Card(name=figure_name, title=title, state="waiting", reason="Run this reproduction to see its figures.")
-    card = card_of(PanelsFigure(result.figures[figure_name], theme))
+    card = card_of(PanelsFigure(result.figures[figure_name], theme_name=theme))
     return replace(card, name=figure_name, title=f"{title}: {card.title}")
 
 

@@ -327,7 +327,9 @@ def test_the_robust_range_leaves_out_outliers_only(peaks: list[float], outside: 
 
 
 def test_both_themes_draw_the_same_values_in_different_colours() -> None:
-    light, dark = (TrajectoriesFigure(history(flight(1, 0.3)), theme).compute() for theme in ("light", "dark"))
+    light, dark = (
+        TrajectoriesFigure(history(flight(1, 0.3)), theme_name=theme).compute() for theme in ("light", "dark")
+    )
     assert trace(light, "flight", trial=1)["y"] == trace(dark, "flight", trial=1)["y"]
     assert trace(light, "flight", trial=1)["line"]["color"] != trace(dark, "flight", trial=1)["line"]["color"]
 
