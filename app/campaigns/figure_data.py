@@ -145,7 +145,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     )
     if not curves:
         return bare
-    drawn = _curves(session, flown, select_individual_flights(bare, view.chosen), experiment.output)
+    drawn = _curves(session, flown, select_individual_flights(bare), experiment.output)
     return replace(
         bare, flights=tuple(replace(flight, curve=drawn.get(flight.number, NO_CURVE)) for flight in bare.flights)
     )
@@ -316,8 +316,7 @@ def _throttle(record: Trajectory) -> Curve:
     reported_s = curve.time_s[1:][(np.diff(curve.values) != 0.0) & (curve.time_s[1:] > 0.0)]
     if len(reported_s) < 2 or np.diff(reported_s).min() < _SPARSE_S:
         return curve
-    received = (curve.time_s <= 0.0) | (curve.time_s >= reported_s[0])
-    return Curve(curve.time_s[received], curve.values[received])
+    return curve.part((curve.time_s <= 0.0) | (curve.time_s >= reported_s[0]))
 
 
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:

@@ -60,7 +60,7 @@ class ComparisonFigure(Figure):
         traces = [
             scatter(
                 "Set point",
-                thin_by_bends(data.set_point.time_s, data.set_point.values),
+                thin_by_bends(data.set_point),
                 role="set point",
                 line=theme.line(palette.dim, 1, "dot"),
                 legendrank=1100,
@@ -98,7 +98,7 @@ class ComparisonFigure(Figure):
         error = "" if flight.error is None else f"<br>error {short(flight.error)} {self.data.error_unit}"
         return scatter(
             literal(_shortened(f"{flight.label} · {flight.name}")),
-            thinned(flight.curve.time_s, flight.curve.values, POINTS),
+            thinned(flight.curve, POINTS),
             role="flight",
             about={"trial": flight.trial_id},
             line=pen(self.palette, flight.index),
@@ -110,7 +110,7 @@ class ComparisonFigure(Figure):
         name = f"{flight.label} minus {self.data.flights[0].label}"
         return scatter(
             name,
-            thinned(flight.curve.time_s, flight.curve.values, POINTS),
+            thinned(flight.curve, POINTS),
             role="difference",
             about={"trial": flight.trial_id},
             line=pen(self.palette, flight.index),
@@ -155,9 +155,8 @@ def pen(palette: theme.Palette, index: int) -> dict[str, object]:
 
 
 def _less(curve: Curve, first: Curve) -> Curve:
-    shared = (first.time_s >= curve.time_s[0]) & (first.time_s <= curve.time_s[-1])
-    time_s = first.time_s[shared]
-    return Curve(time_s, np.interp(time_s, curve.time_s, curve.values) - first.values[shared])
+    shared = first.part((first.time_s >= curve.time_s[0]) & (first.time_s <= curve.time_s[-1]))
+    return Curve(shared.time_s, np.interp(shared.time_s, curve.time_s, curve.values) - shared.values)
 
 
 def _shortened(text: str) -> str:

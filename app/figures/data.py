@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.core.policy import Gain, Gains
 from app.core.records.trajectory import Samples
@@ -22,6 +23,10 @@ class Curve:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def part(self, kept: NDArray[np.bool_] | NDArray[np.uint64] | slice) -> "Curve":
+        """The samples that are `kept`."""
+        return Curve(self.time_s[kept], self.values[kept])
 
     def at(self, time_s: float) -> float | None:
         """Linear interpolation; None outside the record."""

@@ -44,6 +44,7 @@ class ErrorsFigure(CampaignFigure):
 
     def compute(self) -> Card:
         history = self.history
+        scored = [flight for flight in history.flights if flight.error is not None]
         top, outside = self._top()
         strip = self._strip()
         traces = [
@@ -55,16 +56,15 @@ class ErrorsFigure(CampaignFigure):
             *self._repeats(),
             *self._measured(),
             *self._not_valid(),
+            *off_scale_traces(
+                self.palette,
+                [scored[index] for index in outside],
+                top,
+                history.error_unit,
+                last=history.last_number,
+                crowded=self._is_crowded,
+            ),
         ]
-        scored = [flight for flight in history.flights if flight.error is not None]
-        traces += off_scale_traces(
-            self.palette,
-            [scored[index] for index in outside],
-            top,
-            history.error_unit,
-            last=history.last_number,
-            crowded=self._is_crowded,
-        )
         return self.ready(
             traces,
             summary=self._summary(),

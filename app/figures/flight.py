@@ -110,20 +110,16 @@ class FlightFigure(Figure):
         drawn = _line("Deviation", deviation, self.palette.ink, 1.75, "deviation", record.output_unit)
         yield {**drawn, "yaxis": "y2", "showlegend": False}
 
-    def _channels(self) -> list[Trace]:
+    def _channels(self) -> Iterator[Trace]:
         colours = (self.palette.ink, *self.palette.gains)
-        traces: list[Trace] = []
         for place, panel in enumerate(self.record.panels, start=2 + self._has_deviation):
-            axis: Trace = {"yaxis": f"y{place}"}
-            if len(panel.curves) == 1:
-                axis["showlegend"] = False
+            axis: Trace = {"yaxis": f"y{place}"} | ({"showlegend": False} if len(panel.curves) == 1 else {})
             for index, (title, curve) in enumerate(panel.curves.items()):
                 colour, dash = colours[index % len(colours)], ("solid", "dash", "dot")[index % 3]
-                traces.append({**_line(title, curve, colour, 1.5, "input", panel.unit, dash), **axis})
+                yield _line(title, curve, colour, 1.5, "input", panel.unit, dash) | axis
             if panel.limits is not None:
                 command = next(iter(panel.curves.values()))
-                traces += [one | axis for one in _saturated(self.palette, command, panel.limits)]
-        return traces
+                yield from (one | axis for one in _saturated(self.palette, command, panel.limits))
 
     def _layout(self) -> dict[str, object]:
         """The output on top, twice as high as each panel below it."""
@@ -171,20 +167,17 @@ class FlightFigure(Figure):
             "meta": {"panels": len(places)},
         }
 
-    def _context(self) -> list[Trace]:
+    def _context(self) -> Iterator[Trace]:
         """What the flight is compared with, as far as it is known."""
         record, unit = self.record, self.record.output_unit
-        drawn = [_line("Set point", record.set_point, self.palette.dim, 1.5, "set point", None, "dot")]
+        yield _line("Set point", record.set_point, self.palette.dim, 1.5, "set point", None, "dot")
         if record.reference is not None:
             scored = scored_part(record.reference, record.set_point)
-            drawn.append(_line("Reference", scored, self.palette.dim, 1.5, "reference", None, "dashdot"))
+            yield _line("Reference", scored, self.palette.dim, 1.5, "reference", None, "dashdot")
         if record.best is not None:
-            drawn.append(_line(f"Flight {record.best_number} · best", record.best, self.palette.best, 2, "best", unit))
+            yield _line(f"Flight {record.best_number} · best", record.best, self.palette.best, 2, "best", unit)
         if record.predicted:
-            drawn.append(
-                _line(record.predicted_name, record.predicted, self.palette.prediction, 2, "prediction", unit, "dash")
-            )
-        return drawn
+            yield _line(record.predicted_name, record.predicted, self.palette.prediction, 2, "prediction", unit, "dash")
 
     def _summary(self) -> str:
         record = self.record
@@ -196,9 +189,11 @@ class FlightFigure(Figure):
 
     def _table(self) -> Table:
         record, curve = self.record, self.record.curve
-        named = [("measured", "Measured", curve), ("set_point", "Set point", record.set_point)]
-        if record.predicted:
-            named.append(("predicted", record.predicted_name, record.predicted))
+        named = (
+            ("measured", "Measured", curve),
+            ("set_point", "Set point", record.set_point),
+            ("predicted", record.predicted_name, record.predicted or None),
+        )
         channels = [
             (title.lower().replace(" ", "_"), title, channel)
             for panel in record.panels
@@ -240,12 +235,11 @@ def _saturated(palette: theme.Palette, command: Curve, limits: Range) -> Iterato
     )
 
 
-def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
+def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float) -> Iterator[dict[str, object]]:
     """The events' names along their lines: the first at the left of its line, the others at the right, over the curves.
 
     Each one that is near the one before it at the same side is below that.
     """
-    names: list[dict[str, object]] = []
     below = 0
     for index, event in enumerate(events):
         if index == 0:
@@ -254,8 +248,7 @@ def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float
             is_near = index > 1 and event.time_s - events[index - 1].time_s < _NEAR * lasts_s
             below = below + 1 if is_near else 0
             beside = {"bgcolor": palette.surface, "yshift": -_NAME_PX * below}
-        names.append(_along(event.time_s, event.name, palette.dim, **{"y": 1, "yanchor": "top", **beside}))
-    return names
+        yield _along(event.time_s, event.name, palette.dim, **{"y": 1, "yanchor": "top", **beside})
 
 
 def _note(palette: theme.Palette, note: FlightEvent, bottom: float) -> dict[str, object]:
@@ -276,6 +269,6 @@ def _line(
     """A curve, with hover text in its `unit`, none if that is None."""
     style = theme.line(colour, width, dash)
     if unit is None:
-        return scatter(name, thin_by_bends(curve.time_s, curve.values), role=role, line=style)
+        return scatter(name, thin_by_bends(curve), role=role, line=style)
     hover = f"{name}: %{{y:.3f}} {unit}".rstrip() + "<extra></extra>"
-    return scatter(name, thinned(curve.time_s, curve.values, POINTS), role=role, line=style, hovertemplate=hover)
+    return scatter(name, thinned(curve, POINTS), role=role, line=style, hovertemplate=hover)

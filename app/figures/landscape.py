@@ -1,5 +1,6 @@
 """A campaign's gains as a path over the model's error, two gains at a time: a part of the proposal's details."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
@@ -7,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.policy import Gain, Gains
+from app.core.policy import Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
 from app.figures.base import CampaignFigure, Card, Column, Table, Trace, scatter
@@ -138,11 +139,10 @@ class LandscapeFigure(CampaignFigure):
     def _numbers(self, one: Slice) -> list[str]:
         """The numbers of the first, the best and the latest flight, in one text where they have the same place."""
         flights, best = self.history.flights, self.history.best
-        leading = sorted({flight.number for flight in (flights[0], best or flights[0], flights[-1])})
-        places = {flight.number: (flight.gains[one.x], flight.gains[one.y]) for flight in flights}
-        shared: dict[tuple[float, float], list[int]] = {}
-        for number in leading:
-            shared.setdefault(places[number], []).append(number)
+        leading = {flight.number: flight for flight in (flights[0], best or flights[0], flights[-1])}
+        shared = defaultdict[tuple[float, float], list[int]](list)
+        for number, flight in sorted(leading.items()):
+            shared[flight.gains[one.x], flight.gains[one.y]].append(number)
         texts = {numbers[0]: ", ".join(map(str, numbers)) for numbers in shared.values()}
         return [texts.get(flight.number, "") for flight in flights]
 
@@ -152,7 +152,7 @@ class LandscapeFigure(CampaignFigure):
         return f"Flight {flight.number}, {error}"
 
     def _axes(self, index: int, one: Slice) -> dict[str, object]:
-        titles = {gain.name: _title(gain) for gain in self.history.gains}
+        titles = {gain.name: f"{gain.name} ({gain.unit})" if gain.unit else gain.name for gain in self.history.gains}
         own, up = theme.suffix(index), theme.stacked(index, len(self.landscape.slices), _GAP)
         x: dict[str, object] = {"anchor": f"y{own}", "range": _padded(one.x_values), "nticks": 5, "showgrid": False}
         y = {"anchor": f"x{own}", "range": _padded(one.y_values), "nticks": 6, "showgrid": False, "domain": up}
@@ -226,7 +226,3 @@ def _points(
 def _padded(values: Sequence[float]) -> list[float]:
     room = _EDGE * (values[-1] - values[0])
     return [values[0] - room, values[-1] + room]
-
-
-def _title(gain: Gain) -> str:
-    return f"{gain.name} ({gain.unit})" if gain.unit else gain.name

@@ -167,7 +167,7 @@ def _at(line: Line, x: float, digits: int) -> Cell:
 def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
     """Colour, width and dash."""
     _, orange, blue = palette.gains
-    pens: dict[Style, tuple[str, float, str]] = {
+    return {
         "goal": (palette.dim, 1.5, "dot"),
         "reference": (palette.dim, 1.5, "dashdot"),
         "measured": (palette.ink, 2, "solid"),
@@ -185,5 +185,4 @@ def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
         "run 4": (palette.prediction, 2, "dashdot"),
         "run 5": (palette.best, 3, "solid"),
         "run 6": (palette.bad, 2, "longdash"),
-    }
-    return pens[style]
+    }[style]

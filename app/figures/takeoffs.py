@@ -4,11 +4,12 @@ best emphasised, the next one's prediction dashed.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, Final, cast
 
 from app.core.formatting import count, short
 from app.figures import theme
-from app.figures.base import CampaignFigure, Card, Table, Trace, reading, scatter, table_of_curves
+from app.figures.base import CampaignFigure, Card, NamedCurve, Table, Trace, reading, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, Range
 from app.figures.deviations import (
     changes_of,
@@ -77,7 +78,7 @@ class TrajectoriesFigure(CampaignFigure):
 
     def compute(self) -> Card:
         history = self.history
-        emphasised = select_individual_flights(history, history.chosen)
+        emphasised = select_individual_flights(history)
         recorded = [flight for flight in history.flights if flight.curve]
         drawn = [flight for flight in recorded if flight.number in emphasised]
         in_order = sorted(drawn, key=lambda flight: (_ORDER.index(history.standing_of(flight)), flight.number))
@@ -88,14 +89,18 @@ class TrajectoriesFigure(CampaignFigure):
             *band_traces(self.palette, None if history.proposal is None else history.proposal.band),
             *self._goals(),
             *self._altitude_limit(),
+            *self._deviations(in_order),
+            *(self._flight(flight, points) for flight in in_order),
+            *chain.from_iterable(
+                glitch_traces(self.palette, flight.number, flight.curve, flight.glitches, history.output_unit)
+                for flight in drawn
+            ),
+            *self._legend(drawn),
+            *self._prediction(),
+            self._empty("live", "Flying now"),
+            self._empty("pointed", "Pointed at"),
         ]
         low, high, outside = self._span(drawn)
-        traces += self._deviations(in_order)
-        traces += [self._flight(flight, points) for flight in in_order]
-        for flight in drawn:
-            traces += glitch_traces(self.palette, flight.number, flight.curve, flight.glitches, history.output_unit)
-        traces += [*self._legend(drawn), *self._prediction()]
-        traces += [self._empty("live", "Flying now"), self._empty("pointed", "Pointed at")]
         leaving_top = self._off_scale([drawn[index] for index in outside if index < len(drawn)], low, high)
         leaving = []
         if is_step(history.set_point):
@@ -268,7 +273,7 @@ class TrajectoriesFigure(CampaignFigure):
         return [
             scatter(
                 name,
-                thin_by_bends(curve.time_s, curve.values),
+                thin_by_bends(curve),
                 role="target" if curve is self.history.target else name.lower(),
                 line=theme.line(self.palette.dim, 1.5, dash),
                 legendrank=900 + place,
@@ -330,7 +335,7 @@ class TrajectoriesFigure(CampaignFigure):
         self, name: str, curve: Curve, points: int, *, role: str, about: Mapping[str, object], **style: Any
     ) -> Trace:
         each = points // 2 if self.history.window is None else points
-        drawn = thinned(curve.time_s, curve.values, each, self._visible)
+        drawn = thinned(curve, each, self._visible)
         return scatter(name, drawn, role=role, about=about, **style)
 
     def _summary(self, outside: int, leaving: int) -> str:
@@ -345,14 +350,14 @@ class TrajectoriesFigure(CampaignFigure):
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
         history, proposal = self.history, self.history.proposal
-        named = [("set_point", "Set point", history.set_point)]
-        if history.reference is not None:
-            named.append(("reference", "Reference", history.reference))
+        named: list[NamedCurve] = [
+            ("set_point", "Set point", history.set_point),
+            ("reference", "Reference", history.reference),
+        ]
         if envelope is not None:
-            curves = (envelope.band.lower, envelope.median, envelope.band.upper)
             named += [
                 (f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", curve)
-                for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
+                for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, envelope.curves, strict=True)
             ]
         named += [(f"flight_{flight.number}", f"Flight {flight.number}", flight.curve) for flight in drawn]
         if proposal is not None and proposal.curve:

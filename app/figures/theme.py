@@ -1,9 +1,9 @@
 """Chart style of all figures: colour roles for both themes, fonts, axes, margins."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 ThemeName = Literal["light", "dark"]
 MOST_TICKS: Final = 12
@@ -17,6 +17,10 @@ MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({"l": 48, "r": 14, "t": 1
 
 SIGNED_MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({**MARGIN_PX, "l": 62, "r": 18})
 """The same for signed numbers on the axis at the left, and a number at the right end of the abscissa."""
+
+
+_TITLED_GAP: Final = 0.09
+"""Height between two panels as a share of the whole: room for the title of the lower one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +113,23 @@ class Palette:
             f"xaxis{own}": self.axis(x_title if is_lowest else "", **across),
             f"yaxis{own}": self.axis(y_title, domain=stacked(*place), anchor=f"x{own}", **y),
         }
+
+    def titled_panels(
+        self, x_title: str, x: Mapping[str, object], panels: Sequence[tuple[dict[str, object], dict[str, Any]]]
+    ) -> dict[str, object]:
+        """The layout of stacked panels with a note above each: `panels` are the notes, and what is special to the
+        ordinates."""
+        axes: dict[str, object] = {}
+        annotations = []
+        for index, (note, y) in enumerate(panels, start=1):
+            place = (index, len(panels), _TITLED_GAP)
+            axes |= self.panel_axes(place, x_title, x, **y)
+            annotations.append(note | {"y": stacked(*place)[1]})
+        return {
+            "showlegend": False,
+            "margin": {**MARGIN_PX, "t": 24, "r": 30},
+            "annotations": annotations,
+        } | axes
 
     def note(self, text: str, **more: object) -> dict[str, object]:
         """A text at the left edge."""

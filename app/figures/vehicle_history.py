@@ -2,8 +2,9 @@
 the voltage before and after each flight, by battery.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final
 
 from app.core.experiments.base import Fitted
@@ -14,7 +15,6 @@ from app.figures.base import Card, Cell, Column, Figure, Table, Trace, literal, 
 
 REACH: Final = 1.96
 """Half width of a 95 % interval, in standard errors."""
-_GAP: Final = 0.09
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,22 +49,14 @@ class CalibrationFigure(Figure):
         names = [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
         first = {name: next(point.fitted[name] for point in self.points if name in point.fitted) for name in names}
         ticks = theme.flight_ticks(max(point.flight for point in self.points))
-        axes: dict[str, object] = {}
-        titles = []
-        for index, fitted in enumerate(first.values(), start=1):
-            place, unit = (index, len(names), _GAP), f" ({fitted.unit})" if fitted.unit else ""
-            title = f"<b>{fitted.title}</b>{unit}"
-            axes |= self.palette.panel_axes(place, "Flight of this vehicle", ticks, nticks=4, rangemode="normal")
-            titles.append(self.palette.note(title, y=theme.stacked(*place)[1]))
+        titles = [f"<b>{one.title}</b>" + (f" ({one.unit})" if one.unit else "") for one in first.values()]
+        panels = [(self.palette.note(title), {"nticks": 4, "rangemode": "normal"}) for title in titles]
         return self.ready(
             [self._panel(index, name) for index, name in enumerate(names, start=1)],
             summary=f"Bars are 95 % intervals. {self.verdict}",
             table=self._table(first),
-            showlegend=False,
-            margin={**theme.MARGIN_PX, "t": 24, "r": 30},
-            annotations=titles,
             shapes=self._tuned(len(names)),
-            **axes,
+            **self.palette.titled_panels("Flight of this vehicle", ticks, panels),
         )
 
     def _panel(self, index: int, name: str) -> Trace:
@@ -102,14 +94,13 @@ class CalibrationFigure(Figure):
         ]
         for name, one in first.items():
             columns += [Column(name, one.title, one.unit), Column(f"{name}_se", "Standard error", one.unit)]
-        rows: list[tuple[Cell, ...]] = []
-        for point in self.points:
-            cells: list[Cell] = [point.flight, point.campaign_id, point.trial_number]
-            for name in first:
-                fitted = point.fitted.get(name)
-                cells += [None, None] if fitted is None else [fitted.value, fitted.standard_error]
-            rows.append(tuple(cells))
-        return Table(tuple(columns), tuple(rows))
+        return Table(tuple(columns), tuple(_row(point, first) for point in self.points))
+
+
+def _row(point: Point, names: Iterable[str]) -> tuple[Cell, ...]:
+    fits = [point.fitted.get(name) for name in names]
+    estimates = [(None, None) if fit is None else (fit.value, fit.standard_error) for fit in fits]
+    return (point.flight, point.campaign_id, point.trial_number, *chain(*estimates))
 
 
 _BEFORE_PX: Final = 14

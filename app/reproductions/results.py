@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from app.core.records.trajectory import Samples
+from app.figures.data import Curve
 from app.figures.panels import Line, Plot, Style
 from app.figures.scale import thinned
 
@@ -70,7 +71,7 @@ def ratio(measured: float, paper: float | None) -> float | None:
 
 def curve(name: str, style: Style, x: Samples, y: Samples | NDArray[np.int64], *, note: str = "") -> Line:
     """A line through samples of shape (n,), thinned so that its shape and extremes are preserved."""
-    near, values = thinned(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), CURVE_POINTS)
+    near, values = thinned(Curve(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)), CURVE_POINTS)
     return Line(name=name, style=style, x=tuple(near), y=tuple(values), note=note)
 
 

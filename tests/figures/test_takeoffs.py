@@ -304,7 +304,7 @@ def test_many_flights_share_the_points_so_that_the_figure_stays_small() -> None:
 
 
 def test_thinning_keeps_the_extremes_of_a_curve() -> None:
-    x, y = thinned(TIME_S, climb(0.3).values, 100)
+    x, y = thinned(climb(0.3), 100)
     assert len(x) <= 100
     assert max(y) == pytest.approx(climb(0.3).values.max(), abs=1e-4)
     assert (x[0], x[-1]) == (0.0, 32.6)
