@@ -129,12 +129,12 @@ class LandscapeFigure(CampaignFigure):
                 hovertext=[self._hover_text(flight) for flight in flights],
             )
         if best is not None:
-            mark, told = theme.solid(self.palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
-            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=told)
+            mark, hover = theme.solid(self.palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
+            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=hover)
         if proposal is not None:
             mark = theme.solid(self.palette.prediction, size=13, symbol="diamond", line=edge)
-            name, told = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
-            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=told)
+            name, hover = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
+            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=hover)
 
     def _numbers(self, one: Slice) -> list[str]:
         """The numbers of the first, the best and the latest flight, in one text where they have the same place."""

@@ -160,7 +160,7 @@ def _latest_run(row: JobRow) -> LatestRun | None:
 
 
 def _result(session: Session, name: str) -> Result:
-    """The newest result; an empty one if there is none that this version of the program can read."""
+    """The newest result; an empty one without any, or if it is of another version of the program."""
     row = jobs.latest_result(session, REPRODUCTION_JOB, name)
     if row is not None:
         with suppress(ValidationError):
