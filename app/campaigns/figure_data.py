@@ -24,7 +24,19 @@ from app.db import trajectories
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
-from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats, curve_name
+from app.figures.data import (
+    NO_CURVE,
+    Band,
+    Curve,
+    FlightData,
+    History,
+    NextFlight,
+    Noise,
+    Outcome,
+    Range,
+    Repeats,
+    curve_name,
+)
 from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from app.figures.overlays import select_individual_flights
 from app.figures.theme import ThemeName
@@ -72,7 +84,7 @@ class FigureView:
 
 WHOLE_FLIGHT: Final = FigureView()
 
-_Predicted = tuple[Curve | None, Band | None]
+_Predicted = tuple[Curve, Band | None]
 """A predicted curve and its band."""
 
 
@@ -89,7 +101,7 @@ def campaign_figure(
         if name == "takeoffs"
         else history_of(session, campaign_id, curves=False)
     )
-    return card_of(CAMPAIGN_FIGURES[name](past, theme))
+    return card_of(CAMPAIGN_FIGURES[name](past, theme_name=theme))
 
 
 def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
@@ -97,7 +109,7 @@ def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
     campaign_id = trials_service.get_trial(session, trial_id).campaign_id
     trials = history.trials_of(session, campaign_id)
     row = next(row for row in trials if row.id == trial_id)
-    return card_of(FlightFigure(_flight_record(session, row, trials), theme))
+    return card_of(FlightFigure(_flight_record(session, row, trials), theme_name=theme))
 
 
 def history_of(session: Session, campaign_id: int, *, curves: bool, view: FigureView = WHOLE_FLIGHT) -> History:
@@ -133,8 +145,10 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     )
     if not curves:
         return bare
-    drawn = _curves(session, flown, select_individual_flights(bare, view.chosen), experiment.output)
-    return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
+    drawn = _curves(session, flown, select_individual_flights(bare), experiment.output)
+    return replace(
+        bare, flights=tuple(replace(flight, curve=drawn.get(flight.number, NO_CURVE)) for flight in bare.flights)
+    )
 
 
 def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
@@ -144,7 +158,6 @@ def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
         number=row.number,
         gains=row.gains,
         outcome="not yet reviewed" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
-        curve=None,
         error=row.error,
         predicted_error=error,
         interval=_range(interval),
@@ -255,7 +268,7 @@ def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicte
     """A stored predicted curve and its band, where there are any."""
     predicted = None if curve_id is None else trajectories.readable_of(session, [curve_id]).get(curve_id)
     if predicted is None:
-        return None, None
+        return NO_CURVE, None
     lower, upper = band_channels(output)
     has_band = lower in predicted.channels and upper in predicted.channels
     band = Band(lower=_curve(predicted, lower), upper=_curve(predicted, upper)) if has_band else None
@@ -280,7 +293,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         output_unit=CHANNEL_UNITS[experiment.output],
         set_point=set_point,
         reference=modelled if record is None or "reference_m" not in record.channels else _curve(record, "reference_m"),
-        curve=None if record is None else _curve(record, experiment.output),
+        curve=NO_CURVE if record is None else _curve(record, experiment.output),
         predicted=predicted,
         predicted_name=curve_name(predicts=predicts),
         band=band if predicts else None,
@@ -303,8 +316,7 @@ def _throttle(record: Trajectory) -> Curve:
     reported_s = curve.time_s[1:][(np.diff(curve.values) != 0.0) & (curve.time_s[1:] > 0.0)]
     if len(reported_s) < 2 or np.diff(reported_s).min() < _SPARSE_S:
         return curve
-    received = (curve.time_s <= 0.0) | (curve.time_s >= reported_s[0])
-    return Curve(curve.time_s[received], curve.values[received])
+    return curve.part((curve.time_s <= 0.0) | (curve.time_s >= reported_s[0]))
 
 
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:

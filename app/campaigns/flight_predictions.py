@@ -22,6 +22,7 @@ from app.core.tuning.proposals import FlightPredictor, flight_predictor, modelle
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database
+from app.figures.data import Curve
 from app.figures.scale import thin_by_bends, thinned
 
 CURVE_POINTS: Final = 500
@@ -196,12 +197,12 @@ def _only(trajectory: Trajectory, *names: str) -> Trajectory:
 def _curve(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
     if trajectory is None:
         return None
-    time_s, values = thinned(trajectory.time_s, trajectory[channel], CURVE_POINTS)
+    time_s, values = thinned(Curve(trajectory.time_s, trajectory[channel]), CURVE_POINTS)
     return PredictedCurve(time_s=time_s, values=values)
 
 
 def _edge(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
     if trajectory is None or channel not in trajectory.channels:
         return None
-    time_s, values = thin_by_bends(trajectory.time_s, trajectory[channel])
+    time_s, values = thin_by_bends(Curve(trajectory.time_s, trajectory[channel]))
     return PredictedCurve(time_s=time_s, values=values)

@@ -59,7 +59,7 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> Land
         return _not_yet(session, campaign, proposal)
     drawn = history_of(session, campaign_id, curves=False)
     tried = [step["gains"] for step in proposal.explanation.get("ladder", ())]
-    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, tried, theme)))
+    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, tried, theme_name=theme)))
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:

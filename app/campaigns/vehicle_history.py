@@ -60,13 +60,13 @@ def vehicle_figure(session: Session, vehicle_id: int, name: str, theme: ThemeNam
     """Figure of a vehicle: `calibration` or `batteries`. Raises NotFoundError."""
     if name == "batteries":
         fleet.get_vehicle(session, vehicle_id)
-        return card_of(BatteriesFigure(tuple(fleet.battery_flights(session, vehicle_id)), theme))
+        return card_of(BatteriesFigure(tuple(fleet.battery_flights(session, vehicle_id)), theme_name=theme))
     found = calibration_of(session, vehicle_id)
     points = tuple(
         Point(flight=one.flight, campaign_id=one.campaign_id, trial_number=one.trial_number, fitted=_by_name(one))
         for one in found.estimates
     )
-    return card_of(CalibrationFigure(points, found.retune.since, found.retune.sentence, theme))
+    return card_of(CalibrationFigure(points, found.retune.since, found.retune.sentence, theme_name=theme))
 
 
 def _estimates(session: Session, vehicle_id: int) -> tuple[list[Estimate], list[int]]:

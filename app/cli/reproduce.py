@@ -67,4 +67,4 @@ def _document(result: Result) -> dict[str, object]:
         {**{name: value for name, value in asdict(row).items() if name != "numbers"}, **row.numbers}
         for row in result.rows
     ]
-    return {**result.as_json(), "rows": rows}
+    return {**asdict(result), "rows": rows}

@@ -45,7 +45,7 @@ from app.db import trajectories
 from app.db.models import CampaignRow, TrialRow
 from app.figures.base import Card, card_of
 from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure
-from app.figures.data import Curve
+from app.figures.data import NO_CURVE, Curve
 from app.figures.theme import ThemeName
 from app.fleet import service as fleet
 from app.vehicles.registry import VEHICLE_KINDS
@@ -114,7 +114,7 @@ def _pair(side: ComparisonFlight, against: ComparisonFlight, leading: LeadingPai
 
 def comparison_figure(session: Session, trial_ids: Sequence[int], theme: ThemeName) -> Card:
     """The curves over the set point. Raises InputError naming the flights that cannot be compared."""
-    return card_of(ComparisonFigure(_drawn(session, sides_of(session, trial_ids)), theme))
+    return card_of(ComparisonFigure(_drawn(session, sides_of(session, trial_ids)), theme_name=theme))
 
 
 def export_curves(session: Session, trial_ids: Sequence[int]) -> tuple[str, str]:
@@ -124,7 +124,7 @@ def export_curves(session: Session, trial_ids: Sequence[int]) -> tuple[str, str]
     """
     sides = sides_of(session, trial_ids)
     data = _drawn(session, sides)
-    ends = [float(flight.curve.time_s[-1]) for flight in data.flights if flight.curve is not None]
+    ends = [float(flight.curve.time_s[-1]) for flight in data.flights if flight.curve]
     grid = np.arange(round(max(ends, default=0.0) / GRID_STEP_S) + 1, dtype=np.float64) * GRID_STEP_S
     unit = data.output_unit
     columns = {"time_s": [f"{second:.2f}" for second in grid], f"set_point_{unit}": _column(data.set_point, grid)}
@@ -135,8 +135,8 @@ def export_curves(session: Session, trial_ids: Sequence[int]) -> tuple[str, str]
     return f"{file_stem([side.row for side in sides])}.csv", "\n".join(lines) + "\n"
 
 
-def _column(curve: Curve | None, grid: Samples) -> list[str]:
-    if curve is None or len(curve.time_s) == 0:
+def _column(curve: Curve, grid: Samples) -> list[str]:
+    if not curve:
         return [""] * len(grid)
     values = np.interp(grid, curve.time_s, curve.values, left=np.nan, right=np.nan)
     return ["" if np.isnan(value) else f"{value:.6g}" for value in values]
@@ -154,17 +154,18 @@ def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonDat
         set_point=Curve(experiment.grid_s, experiment.set_point(experiment.grid_s)),
         flights=tuple(
             ComparedCurve(
+                index=index,
                 trial_id=side.row.id,
                 label=side.label,
                 name=side.name,
-                curve=None
+                curve=NO_CURVE
                 if side.row.trajectory_id is None
                 else Curve(
                     records[side.row.trajectory_id].time_s, records[side.row.trajectory_id][side.experiment.output]
                 ),
                 error=side.row.error,
             )
-            for side in sides
+            for index, side in enumerate(sides)
         ),
     )
 

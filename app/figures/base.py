@@ -2,19 +2,20 @@
 
 import html
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, Final, Literal, Protocol
+from typing import ClassVar, Final, Literal
 
 from pydantic import with_config
 
-from app.figures.data import Curve
+from app.figures.data import Curve, History
+from app.figures.theme import PALETTES, Palette, ThemeName
 
 Cell = str | int | float | None
 PlotlyJson = Mapping[str, object]
 Trace = dict[str, object]
-CardState = Literal["ready", "waiting", "failed"]
 
 CHECKED_ITEMS: Final = 20
 """Items validated per list of a trace: lists are as long as there are flights or samples, with items of one kind."""
@@ -54,26 +55,61 @@ class Card:
 
     name: str
     title: str
-    state: CardState
+    state: Literal["ready", "waiting", "failed"]
     summary: str = ""
     reason: str = ""
     figure: PlotlyJson | None = None
     table: Table | None = None
 
 
-class Figure(Protocol):
-    """One figure over plain data, without any other input."""
+@dataclass(frozen=True, slots=True)
+class Figure(ABC):
+    """One figure over plain data, without any other input but the theme."""
 
+    theme_name: ThemeName = field(default="light", kw_only=True)
     name: ClassVar[str]
 
     @property
+    @abstractmethod
     def title(self) -> str: ...
 
     def not_ready(self) -> str | None:
         """Why there is nothing to draw yet, or None."""
-        ...
+        return None
 
+    @abstractmethod
     def compute(self) -> Card: ...
+
+    @property
+    def palette(self) -> Palette:
+        return PALETTES[self.theme_name]
+
+    def ready(self, traces: Sequence[Trace], *, summary: str, table: Table, **layout: object) -> Card:
+        """The card of a figure that could be drawn, with its part of the layout. The browser keeps what a person chose
+        in the figure of the same name (`uirevision`).
+
+        Plotly validates every property, and the first items of long lists. Raises ValueError for a property that does
+        not exist.
+        """
+        import plotly.graph_objects as go
+
+        whole = self.palette.layout(**{"uirevision": self.name, **layout})
+        go.Figure(data=[_shortened(trace) for trace in traces], layout=whole)
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=summary,
+            figure={"data": list(traces), "layout": whole},
+            table=table,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignFigure(Figure):
+    """A figure of a campaign."""
+
+    history: History
 
 
 def card_of(figure: Figure) -> Card:
@@ -90,20 +126,6 @@ def card_of(figure: Figure) -> Card:
             state="failed",
             reason="This figure could not be drawn. No data is lost; see the server's log.",
         )
-
-
-def ready(
-    figure: Figure, traces: Sequence[Mapping[str, object]], layout: Mapping[str, object], *, summary: str, table: Table
-) -> Card:
-    """The card of a figure that could be drawn."""
-    return Card(
-        name=figure.name,
-        title=figure.title,
-        state="ready",
-        summary=summary,
-        figure=plotly_json(traces, layout),
-        table=table,
-    )
 
 
 def scatter(
@@ -137,8 +159,8 @@ def reading(title: str, unit: str, note: str = "", *, form: str = ".3f") -> str:
     return f"<b>{title}</b><br>{values}{note}<extra></extra>"
 
 
-NamedCurve = tuple[str, str, Curve]
-"""A curve of a table, with the name and the title of its column."""
+NamedCurve = tuple[str, str, Curve | None]
+"""A curve of a table, if there is one, with the name and the title of its column."""
 
 
 def table_of_curves(
@@ -146,13 +168,13 @@ def table_of_curves(
 ) -> Table:
     """The values of curves in a unit, and of others without one, at these times, of which `digits` decimals are
     shown."""
-    columns = [Column(name, title, unit, 3) for name, title, _ in curves]
-    columns += [Column(name, title, "", 3) for name, title, _ in others]
+    with_units = [*((unit, *named) for named in curves), *(("", *named) for named in others)]
+    known = [(Column(name, title, own, 3), curve) for own, name, title, curve in with_units if curve is not None]
     rows = []
     for time_s in times_s:
-        values = [curve.at(time_s) for *_, curve in (*curves, *others)]
+        values = [curve.at(time_s) for _, curve in known]
         rows.append((round(time_s, digits), *(None if value is None else round(value, 4) for value in values)))
-    return Table((Column("time_s", "Time", "s", digits), *columns), tuple(rows))
+    return Table((Column("time_s", "Time", "s", digits), *(column for column, _ in known)), tuple(rows))
 
 
 def literal(text: str) -> str:
@@ -160,23 +182,8 @@ def literal(text: str) -> str:
     return html.escape(text, quote=False).replace("%{", "%&#123;")
 
 
-def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:
-    """Traces and layout as Plotly's own JSON, with every property validated, and the first items of long lists.
-
-    Raises ValueError for a property that does not exist.
-    """
-    import plotly.graph_objects as go
-
-    go.Figure(data=[_shortened(trace) for trace in traces], layout=dict(layout))
-    return {"data": list(traces), "layout": dict(layout)}
-
-
-def _shortened(properties: Mapping[str, object]) -> dict[str, object]:
+def _shortened(value: object) -> object:
     """The same properties with lists cut to their first items: Plotly's validation of long lists is slow."""
-    return {name: _head(value) for name, value in properties.items()}
-
-
-def _head(value: object) -> object:
     if isinstance(value, Mapping):
-        return _shortened(value)
+        return {name: _shortened(each) for name, each in value.items()}
     return value[:CHECKED_ITEMS] if isinstance(value, list) else value

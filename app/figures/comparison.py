@@ -1,13 +1,13 @@
 """Flights of any campaigns over the set point, and below them the difference of each from the first."""
 
-from dataclasses import dataclass
-from typing import ClassVar, Final
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from app.core.formatting import short
 from app.figures import theme
-from app.figures.base import Card, Table, Trace, literal, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Figure, Table, Trace, literal, reading, scatter, table_of_curves
 from app.figures.data import Curve, Scored
 from app.figures.overlays import off_scale
 from app.figures.scale import span_around, thin_by_bends, thinned
@@ -20,17 +20,14 @@ LONGEST_NAME: Final = 34
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparedCurve:
-    """One flight: `label` is its letter, `name` its title; `curve` is None if it has no record."""
+    """One flight: its `index` among all, `label` is its letter, `name` its title; `curve` is empty without a record."""
 
+    index: int
     trial_id: int
     label: str
     name: str
-    curve: Curve | None
+    curve: Curve
     error: float | None
-
-
-Drawn = tuple[int, ComparedCurve, Curve]
-"""A flight with its index among all flights, and its curve."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +39,7 @@ class ComparisonData(Scored):
 
 
 @dataclass(frozen=True, slots=True)
-class ComparisonFigure:
+class ComparisonFigure(Figure):
     """Table columns: `time_s`, `set_point`, the flights by their letters (`a`, `b`, …), and `b_less_a` and so on.
 
     Every trace carries `meta`: `role` (set point, flight, difference, off scale) and, except for the set point,
@@ -50,105 +47,73 @@ class ComparisonFigure:
     """
 
     data: ComparisonData
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "comparing"
-    title: ClassVar[str] = "Curves compared"
+    name = "comparing"
+    title = "Curves compared"
 
     def not_ready(self) -> str | None:
         return None if self._recorded() else "None of these flights has a record."
 
     def compute(self) -> Card:
-        palette, recorded = theme.PALETTES[self.theme_name], self._recorded()
-        low, high, outside = span_around(self.data.set_point.values, [curve.values for *_, curve in recorded])
-        traces = [self._set_point(palette)]
-        traces += [self._flight(palette, index, flight, curve) for index, flight, curve in recorded]
-        traces += [
-            self._difference(palette, index, flight, curve) for index, flight, curve in self._differences(recorded)
+        palette, data, recorded = self.palette, self.data, self._recorded()
+        first, end, unit = data.flights[0].label, float(data.set_point.time_s[-1]), data.output_unit
+        low, high, outside = span_around(data.set_point.values, [flight.curve.values for flight in recorded])
+        traces = [
+            scatter(
+                "Set point",
+                thin_by_bends(data.set_point),
+                role="set point",
+                line=theme.line(palette.dim, 1, "dot"),
+                legendrank=1100,
+            ),
+            *map(self._flight, recorded),
+            *map(self._difference, self._differences()),
         ]
         traces += [
             off_scale(
-                flight.label,
-                curve,
-                low,
-                high,
-                palette.bad,
-                trial=flight.trial_id,
-                text=flight.label,
-                unit=self.data.output_unit,
+                flight.label, flight.curve, low, high, palette.bad, trial=flight.trial_id, text=flight.label, unit=unit
             )
-            for _, flight, curve in (recorded[place] for place in outside)
+            for flight in (recorded[place] for place in outside)
         ]
-        return ready(
-            self,
+        zero = {"zeroline": True, "zerolinecolor": palette.dim}
+        return self.ready(
             traces,
-            self._layout(palette, low, high),
             summary=self._summary(len(outside)),
-            table=self._table(recorded),
+            table=self._table(),
+            xaxis=palette.axis("Time since the command (s)", anchor="y2", range=[-0.01 * end, end]),
+            yaxis=palette.axis(f"{data.output_title} ({unit})", domain=[0.4, 1.0], range=[low, high], nticks=7),
+            yaxis2=palette.axis(f"Difference from {first} ({unit})", domain=[0.0, 0.32], nticks=5, **zero),
         )
 
-    def _recorded(self) -> list[Drawn]:
-        return [
-            (index, flight, flight.curve)
-            for index, flight in enumerate(self.data.flights)
-            if flight.curve is not None and len(flight.curve.time_s)
-        ]
+    def _recorded(self) -> list[ComparedCurve]:
+        return [flight for flight in self.data.flights if flight.curve]
 
-    def _differences(self, recorded: list[Drawn]) -> list[Drawn]:
+    def _differences(self) -> list[ComparedCurve]:
         """Difference of every other flight from the first, at the first one's times, where both were recorded."""
-        first = self.data.flights[0].curve
-        if first is None or len(first.time_s) == 0:
+        first, *others = self._recorded()
+        if first is not self.data.flights[0]:
             return []
-        return [(index, flight, _less(curve, first)) for index, flight, curve in recorded if index > 0]
+        return [replace(flight, curve=_less(flight.curve, first.curve)) for flight in others]
 
-    def _layout(self, palette: theme.Palette, low: float, high: float) -> dict[str, object]:
-        data, end = self.data, float(self.data.set_point.time_s[-1])
-        first = data.flights[0].label
-        return theme.layout(
-            palette,
-            xaxis=theme.axis(palette, "Time since the command (s)", anchor="y2", range=[-0.01 * end, end]),
-            yaxis=theme.axis(
-                palette, f"{data.output_title} ({data.output_unit})", domain=[0.4, 1.0], range=[low, high], nticks=7
-            ),
-            yaxis2=theme.axis(
-                palette,
-                f"Difference from {first} ({data.output_unit})",
-                domain=[0.0, 0.32],
-                nticks=5,
-                zeroline=True,
-                zerolinecolor=palette.dim,
-            ),
-            uirevision="comparing",
-        )
-
-    def _set_point(self, palette: theme.Palette) -> Trace:
-        return scatter(
-            "Set point",
-            thin_by_bends(self.data.set_point.time_s, self.data.set_point.values),
-            role="set point",
-            line=theme.line(palette.dim, 1, "dot"),
-            legendrank=1100,
-        )
-
-    def _flight(self, palette: theme.Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
+    def _flight(self, flight: ComparedCurve) -> Trace:
         error = "" if flight.error is None else f"<br>error {short(flight.error)} {self.data.error_unit}"
         return scatter(
             literal(_shortened(f"{flight.label} · {flight.name}")),
-            thinned(curve.time_s, curve.values, POINTS),
+            thinned(flight.curve, POINTS),
             role="flight",
             about={"trial": flight.trial_id},
-            line=pen(palette, index),
+            line=pen(self.palette, flight.index),
             legendgroup=flight.label,
             hovertemplate=reading(f"{flight.label} · {literal(flight.name)}", self.data.output_unit, error),
         )
 
-    def _difference(self, palette: theme.Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
+    def _difference(self, flight: ComparedCurve) -> Trace:
         name = f"{flight.label} minus {self.data.flights[0].label}"
         return scatter(
             name,
-            thinned(curve.time_s, curve.values, POINTS),
+            thinned(flight.curve, POINTS),
             role="difference",
             about={"trial": flight.trial_id},
-            line=pen(palette, index),
+            line=pen(self.palette, flight.index),
             legendgroup=flight.label,
             yaxis="y2",
             showlegend=False,
@@ -168,14 +133,14 @@ class ComparisonFigure:
             f"{data.flights[0].label}: {listed}.{off}"
         )
 
-    def _table(self, recorded: list[Drawn]) -> Table:
+    def _table(self) -> Table:
         data, first = self.data, self.data.flights[0].label
         named = [
             ("set_point", "Set point", data.set_point),
-            *((flight.label.lower(), f"{flight.label} · {flight.name}", curve) for _, flight, curve in recorded),
+            *((flight.label.lower(), f"{flight.label} · {flight.name}", flight.curve) for flight in self._recorded()),
             *(
-                (f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}", curve)
-                for _, flight, curve in self._differences(recorded)
+                (f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}", flight.curve)
+                for flight in self._differences()
             ),
         ]
         seconds = np.linspace(0.0, float(data.set_point.time_s[-1]), TABLE_ROWS)
@@ -190,9 +155,8 @@ def pen(palette: theme.Palette, index: int) -> dict[str, object]:
 
 
 def _less(curve: Curve, first: Curve) -> Curve:
-    shared = (first.time_s >= curve.time_s[0]) & (first.time_s <= curve.time_s[-1])
-    time_s = first.time_s[shared]
-    return Curve(time_s, np.interp(time_s, curve.time_s, curve.values) - first.values[shared])
+    shared = first.part((first.time_s >= curve.time_s[0]) & (first.time_s <= curve.time_s[-1]))
+    return Curve(shared.time_s, np.interp(shared.time_s, curve.time_s, curve.values) - shared.values)
 
 
 def _shortened(text: str) -> str:

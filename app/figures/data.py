@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.core.policy import Gain, Gains
 from app.core.records.trajectory import Samples
@@ -20,11 +21,22 @@ class Curve:
     time_s: Samples
     values: Samples
 
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def part(self, kept: NDArray[np.bool_] | NDArray[np.uint64] | slice) -> "Curve":
+        """The samples that are `kept`."""
+        return Curve(self.time_s[kept], self.values[kept])
+
     def at(self, time_s: float) -> float | None:
         """Linear interpolation; None outside the record."""
-        if len(self.time_s) == 0 or not self.time_s[0] <= time_s <= self.time_s[-1]:
+        if len(self) == 0 or not self.time_s[0] <= time_s <= self.time_s[-1]:
             return None
         return float(np.interp(time_s, self.time_s, self.values))
+
+
+NO_CURVE: Final = Curve(np.empty(0), np.empty(0))
+"""That of a flight without a record, or without a prediction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +45,6 @@ class Range:
 
     low: float
     high: float
-
-    def __contains__(self, value: float) -> bool:
-        return self.low <= value <= self.high
 
     def slice_of(self, rising: Samples) -> tuple[int, int]:
         """First index and end of the part of `rising`, shape (n,), inside the range, plus one sample on each side."""
@@ -54,11 +63,11 @@ class Band:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnyFlight:
     """A trial that was flown, or is next: its output as flown, or as the model has it, with the prediction of its
-    error in the experiment's error unit and the interval of that; None where there is none."""
+    error in the experiment's error unit and the interval of that, None where there is none."""
 
     number: int
     gains: Gains
-    curve: Curve | None
+    curve: Curve = NO_CURVE
     predicted_error: float | None = None
     interval: Range | None = None
 

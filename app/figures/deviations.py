@@ -41,17 +41,13 @@ def scored_part(curve: Curve, set_point: Curve) -> Curve:
     """The part of a curve from the first change of the set point on: steps are not scored before it. All of the curve
     for a single step."""
     changes_s = changes_of(set_point)
-    if not changes_s:
-        return curve
-    scored = curve.time_s >= changes_s[0]
-    return Curve(curve.time_s[scored], curve.values[scored])
+    return curve.part(curve.time_s >= changes_s[0]) if changes_s else curve
 
 
 def deviation_of(curve: Curve, set_point: Curve) -> Curve:
     """Output − set point (or what else the output is scored against), from the command on."""
-    flown = curve.time_s >= 0.0
-    time_s = curve.time_s[flown]
-    return Curve(time_s, curve.values[flown] - np.interp(time_s, set_point.time_s, set_point.values))
+    flown = curve.part(curve.time_s >= 0.0)
+    return Curve(flown.time_s, flown.values - np.interp(flown.time_s, set_point.time_s, set_point.values))
 
 
 def after_climb(deviation: Curve, set_point: Curve) -> Curve:
@@ -59,13 +55,12 @@ def after_climb(deviation: Curve, set_point: Curve) -> Curve:
 
     The climb ends where the output is first within 5 % of the set point, or if it never is, nearest to it.
     """
-    lasts = deviation.time_s <= set_point.time_s[-1]
-    time_s, values = deviation.time_s[lasts], deviation.values[lasts]
-    if len(values) == 0:
-        return Curve(time_s, values)
-    is_near = np.abs(values) <= NEAR * float(set_point.values.max())
-    first = int(is_near.argmax() if is_near.any() else np.abs(values).argmin())
-    return Curve(time_s[first:], values[first:])
+    lasting = deviation.part(deviation.time_s <= set_point.time_s[-1])
+    if not lasting:
+        return lasting
+    sizes = np.abs(lasting.values)
+    is_near = sizes <= NEAR * float(set_point.values.max())
+    return lasting.part(slice(int(is_near.argmax() if is_near.any() else sizes.argmin()), None))
 
 
 def deviation_limit(curves: Sequence[Curve], set_point: Curve) -> float:
@@ -80,8 +75,8 @@ def scored_deviation_limit(curve: Curve, target: Curve, set_point: Curve) -> flo
     """The same for a flight that is scored from the first change of the set point on: for what is scored."""
     if not changes_of(set_point):
         return deviation_limit([curve], set_point)
-    highest, lasts = float(set_point.values.max()), curve.time_s <= set_point.time_s[-1]
-    scored = scored_part(deviation_of(Curve(curve.time_s[lasts], curve.values[lasts]), target), set_point).values
+    highest, lasting = float(set_point.values.max()), curve.part(curve.time_s <= set_point.time_s[-1])
+    scored = scored_part(deviation_of(lasting, target), set_point).values
     peak = float(np.abs(scored).max()) if len(scored) else OPEN * highest
     return min(MOST * highest, max(FINEST * highest, peak) * ROOM)
 
@@ -126,10 +121,8 @@ class _Label:
 def _marks(flights: Sequence[FlightData], set_point: Curve, limit: float, window: Range) -> Iterator[_Mark]:
     """The mark of each flight that leaves the panel in the visible time range."""
     for flight in flights:
-        if flight.curve is None:
-            continue
         part = part_off_scale(after_climb(deviation_of(flight.curve, set_point), set_point), -limit, limit, window)
-        if part is not None:
+        if part:
             place = int(np.abs(part.values).argmax())
             peak = signed(float(part.values[place]), SHARED_DIGITS)
             up = leaves_upward(part.values, -limit, limit)
@@ -169,15 +162,14 @@ def _trace(palette: theme.Palette, mark: _Mark, label: _Label | None, limit: flo
         text=f"Deviation of flight {mark.number}",
         unit=unit,
         digits=SHARED_DIGITS if label is not None and len(label.numbers) > 1 else DIGITS,
-        side=None if label is None else label.side,
+        side="center" if label is None else label.side,
         yaxis="y2",
     )
 
 
 def deviation_axis(palette: theme.Palette, limit: float, unit: str, **more: object) -> dict[str, object]:
     """The ordinate of the panel, from −limit to limit."""
-    return theme.axis(
-        palette,
+    return palette.axis(
         f"Deviation ({unit})",
         range=[-limit, limit],
         nticks=5,

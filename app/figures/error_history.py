@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from app.core import formatting
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.data import AnyFlight, History, Range
+from app.figures.base import CampaignFigure, Card, Cell, Column, Table, Trace, scatter
+from app.figures.data import AnyFlight, Range
 from app.figures.overlays import MANY, off_scale_traces
 from app.figures.scale import robust_top
 
@@ -20,7 +20,7 @@ _STRIP_GAP: Final = 0.07
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorsFigure:
+class ErrorsFigure(CampaignFigure):
     """Table columns: `flight`, `outcome`, `error`, `standard_error` (of one flight, if the noise is known),
     `predicted_error`, `predicted_low`, `predicted_high`, `best_so_far`; the proposal is the last row.
 
@@ -30,10 +30,8 @@ class ErrorsFigure:
     without an error are marked in a strip below the axis of errors.
     """
 
-    history: History
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "errors"
-    title: ClassVar[str] = "Error per flight"
+    name = "errors"
+    title = "Error per flight"
 
     @property
     def _reading(self) -> str:
@@ -45,38 +43,38 @@ class ErrorsFigure:
         return "The error of each flight appears here after the first valid flight."
 
     def compute(self) -> Card:
-        palette, history = theme.PALETTES[self.theme_name], self.history
-        top, outside = self._top()
-        strip = self._strip(palette)
-        traces = [
-            *self._noise(palette),
-            self._best_so_far(palette),
-            *self._threshold(palette),
-            *self._intervals(palette, top),
-            *self._predicted(palette, 1.08 * top),
-            *self._repeats(palette),
-            *self._measured(palette),
-            *self._not_valid(palette),
-        ]
+        history = self.history
         scored = [flight for flight in history.flights if flight.error is not None]
-        traces += off_scale_traces(
-            palette,
-            [scored[index] for index in outside],
-            top,
-            history.error_unit,
-            last=history.last_number,
-            crowded=self._is_crowded,
-        )
-        layout = theme.layout(
-            palette,
-            xaxis=theme.axis(
-                palette,
+        top, outside = self._top()
+        strip = self._strip()
+        traces = [
+            *self._noise(),
+            self._best_so_far(),
+            *self._threshold(),
+            *self._intervals(top),
+            *self._predicted(1.08 * top),
+            *self._repeats(),
+            *self._measured(),
+            *self._not_valid(),
+            *off_scale_traces(
+                self.palette,
+                [scored[index] for index in outside],
+                top,
+                history.error_unit,
+                last=history.last_number,
+                crowded=self._is_crowded,
+            ),
+        ]
+        return self.ready(
+            traces,
+            summary=self._summary(),
+            table=self._table(),
+            xaxis=self.palette.axis(
                 "Flight",
                 anchor="y2" if strip else "y",
                 **theme.flight_ticks(history.last_number) | {"range": [0.5, self._right]},
             ),
-            yaxis=theme.axis(
-                palette,
+            yaxis=self.palette.axis(
                 f"Error ({history.error_unit})",
                 domain=[STRIP + _STRIP_GAP if strip else 0.0, 1.0],
                 range=[0, 1.08 * top],
@@ -84,18 +82,15 @@ class ErrorsFigure:
             ),
             **strip,
             margin={**theme.MARGIN_PX, "l": 60, "r": 30},
-            annotations=self._labels(palette, top),
-            uirevision="errors",
+            annotations=self._labels(top),
         )
-        return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _strip(self, palette: theme.Palette) -> dict[str, object]:
+    def _strip(self) -> dict[str, object]:
         """The ordinate of the strip below the errors; empty if every flight has an error."""
         if all(flight.error is not None for flight in self.history.flights):
             return {}
         return {
-            "yaxis2": theme.axis(
-                palette,
+            "yaxis2": self.palette.axis(
                 domain=[0.0, STRIP],
                 range=[-1, 1],
                 tickvals=[0],
@@ -119,7 +114,7 @@ class ErrorsFigure:
         high = max(self.history.valid_errors[:1], default=min(errors))
         return robust_top(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
 
-    def _measured(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _measured(self) -> Iterator[Trace]:
         flights, best, noise = self.history.valid, self.history.best, self.history.noise
         if not flights:
             return
@@ -127,8 +122,7 @@ class ErrorsFigure:
         spread = "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
         bars: dict[str, Any] = {}
         if noise is not None and not self._is_crowded:
-            bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
-            bars["error_y"] = bar
+            bars["error_y"] = theme.bars(self.palette.ink, 1.5, 5, type="constant", value=round(noise.sd, 6))
         yield scatter(
             "Measured",
             ([flight.number for flight in flights], [round(error, 6) for error in self.history.valid_errors]),
@@ -137,7 +131,7 @@ class ErrorsFigure:
             cliponaxis=False,
             **bars,
             marker=theme.solid(
-                [palette.best if flight is best else palette.ink for flight in flights],
+                [self.palette.best if flight is best else self.palette.ink for flight in flights],
                 size=[13 if flight is best else size for flight in flights],
                 symbol=["star" if flight is best else "circle" for flight in flights],
             ),
@@ -148,7 +142,7 @@ class ErrorsFigure:
     def _is_crowded(self) -> bool:
         return len(self.history.flights) > MANY
 
-    def _noise(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _noise(self) -> Iterator[Trace]:
         """Range in which another flight of the best gains would lie: a result inside it is not significant."""
         noise = self.history.noise
         if noise is None or noise.around_best is None:
@@ -158,12 +152,12 @@ class ErrorsFigure:
             "Scatter of best" if noise.repeats else "Scatter (prior)",
             ([0.5, self._right, self._right, 0.5, 0.5], [low, low, high, high, low]),
             role="noise",
-            line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
+            line=theme.line(theme.with_opacity(self.palette.best, 0.3), 0.75),
             fill="toself",
-            fillcolor=theme.with_opacity(palette.best, 0.12),
+            fillcolor=theme.with_opacity(self.palette.best, 0.12),
         )
 
-    def _repeats(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _repeats(self) -> Iterator[Trace]:
         """Mean of flights with the same gains, with its standard error, beside the last of them."""
         repeats = () if self.history.noise is None else self.history.noise.repeats
         if not repeats:
@@ -179,19 +173,15 @@ class ErrorsFigure:
                 f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit} (standard error)"
                 for group in repeats
             ],
-            error_y={
-                "type": "data",
-                "array": [round(group.standard_error, 6) for group in repeats],
-                "color": palette.best,
-                "thickness": 3,
-                "width": 0,
-            },
-            marker=theme.solid(palette.best, size=9, symbol="square"),
+            error_y=theme.bars(
+                self.palette.best, 3, 0, type="data", array=[round(group.standard_error, 6) for group in repeats]
+            ),
+            marker=theme.solid(self.palette.best, size=9, symbol="square"),
             cliponaxis=False,
             hovertemplate="<b>%{text}</b><extra></extra>",
         )
 
-    def _intervals(self, palette: theme.Palette, top: float) -> Iterator[Trace]:
+    def _intervals(self, top: float) -> Iterator[Trace]:
         """Predicted interval of each flight's error, or only the next one's if there are many.
 
         A bar behind the diamond of the prediction, cut at the edge.
@@ -211,7 +201,7 @@ class ErrorsFigure:
             about=self._next,
             visible=bool(known),
             text=text,
-            line=theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
+            line=theme.line(theme.with_opacity(self.palette.prediction, 0.4), 8),
             connectgaps=False,
             hovertemplate=f"<b>Flight %{{x}}</b><br>predicted %{{text}} {self.history.error_unit}<extra></extra>",
         )
@@ -227,31 +217,31 @@ class ErrorsFigure:
     def _expected(self) -> list[tuple[int, Range]]:
         return [(each.number, each.interval) for each in self._predicted_flights() if each.interval is not None]
 
-    def _labels(self, palette: theme.Palette, top: float) -> list[dict[str, object]]:
+    def _labels(self, top: float) -> list[dict[str, object]]:
         """The error beside each mark, clear of the steps; with many flights only the best."""
         flights, best = self.history.valid, self.history.best
         return [
             theme.label(
                 formatting.short(flight.error),
-                palette.best if flight is best else palette.ink,
+                self.palette.best if flight is best else self.palette.ink,
                 x=flight.number,
                 y=flight.error,
                 xshift=6,
                 yshift=13,
-                **({"bgcolor": palette.surface, "borderpad": 1} if self._is_crowded else {}),
+                **({"bgcolor": self.palette.surface, "borderpad": 1} if self._is_crowded else {}),
             )
             for flight in flights
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _not_valid(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _not_valid(self) -> Iterator[Trace]:
         """Marks for flights that do not count and those without a review: at their error, or in the strip."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet reviewed"}]
         unjudged = [flight for flight in flights if flight.outcome == "not yet reviewed"]
         for role, marked, symbol, colour in (
-            ("not counted", uncounted, "x-thin", palette.bad),
-            ("not yet reviewed", unjudged, "circle-open", palette.dim),
+            ("not counted", uncounted, "x-thin", self.palette.bad),
+            ("not yet reviewed", unjudged, "circle-open", self.palette.dim),
         ):
             scored = [flight for flight in marked if flight.error is not None]
             others = [flight for flight in marked if flight.error is None]
@@ -275,16 +265,16 @@ class ErrorsFigure:
                         hovertemplate=f"<b>Flight %{{x}}, %{{text}}</b><br>{note}<extra></extra>",
                     )
 
-    def _best_so_far(self, palette: theme.Palette) -> Trace:
+    def _best_so_far(self) -> Trace:
         numbers = [flight.number for flight in self.history.valid]
         return scatter(
             "Best so far",
             (numbers, [round(value, 6) for value in accumulate(self.history.valid_errors, min)]),
             role="best so far",
-            line={**theme.line(palette.best, 2), "shape": "hv"},
+            line={**theme.line(self.palette.best, 2), "shape": "hv"},
         )
 
-    def _threshold(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _threshold(self) -> Iterator[Trace]:
         """The error below which the stop rule counts a further flight as an improvement."""
         errors, improvement = self.history.valid_errors, self.history.stop_improvement
         if not errors or improvement is None:
@@ -294,10 +284,10 @@ class ErrorsFigure:
             f"To beat: {formatting.short(value)}",
             ([0.5, self._right], [value, value]),
             role="threshold",
-            line=theme.line(palette.dim, 1.25, "dot"),
+            line=theme.line(self.palette.dim, 1.25, "dot"),
         )
 
-    def _predicted(self, palette: theme.Palette, top: float) -> Iterator[Trace]:
+    def _predicted(self, top: float) -> Iterator[Trace]:
         """The predicted error of each flight, or only the next one's if there are many: a diamond, or where it is off
         the scale, a triangle at the edge."""
         known = self._predictions()
@@ -314,7 +304,7 @@ class ErrorsFigure:
             marker={
                 "size": 13,
                 "symbol": ["triangle-up-open" if value > top else "diamond-open" for _, value in known],
-                "color": palette.prediction,
+                "color": self.palette.prediction,
                 "line": {"width": 1.75},
             },
             cliponaxis=False,

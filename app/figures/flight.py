@@ -4,14 +4,14 @@ its deviation, climb rate, throttle and battery, with the flight's events.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from app.core.records.flight_events import FlightEvent
 from app.figures import theme
-from app.figures.base import Card, Table, Trace, literal, ready, scatter, table_of_curves
-from app.figures.data import Band, Curve, Range, Scored
+from app.figures.base import Card, Figure, Table, Trace, literal, scatter, table_of_curves
+from app.figures.data import NO_CURVE, Band, Curve, Range, Scored
 from app.figures.deviations import deviation_axis, deviation_of, is_step, scored_deviation_limit, scored_part
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
@@ -51,8 +51,8 @@ class FlightRecordData(Scored):
     record that is missing will not follow by itself."""
 
     number: int
-    curve: Curve | None
-    predicted: Curve | None = None
+    curve: Curve
+    predicted: Curve = NO_CURVE
     predicted_name: str = "Predicted"
     band: Band | None = None
     glitches: tuple[Range, ...] = ()
@@ -65,7 +65,7 @@ class FlightRecordData(Scored):
 
 
 @dataclass(frozen=True, slots=True)
-class FlightFigure:
+class FlightFigure(Figure):
     """Table columns: `time_s`, `measured`, `set_point`, `predicted` (if known), then the other channels by title.
 
     Every trace carries `meta`: `role` (set point, reference, best, prediction, flight, band, glitch, deviation, input,
@@ -74,12 +74,11 @@ class FlightFigure:
     """
 
     record: FlightRecordData
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "flight"
-    title: ClassVar[str] = "Flight record"
+    name = "flight"
+    title = "Flight record"
 
     def not_ready(self) -> str | None:
-        if self.record.curve is not None and len(self.record.curve.time_s):
+        if self.record.curve:
             return None
         return (
             "No record of this flight was received."
@@ -88,63 +87,58 @@ class FlightFigure:
         )
 
     def compute(self) -> Card:
-        palette, record, curve = theme.PALETTES[self.theme_name], self.record, self.record.curve
-        assert curve is not None
+        record, curve = self.record, self.record.curve
         traces = [
-            *band_traces(palette, record.band),
-            *self._context(palette),
-            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", record.output_unit),
-            *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
-            *self._deviation(palette, curve),
-            *self._channels(palette),
+            *band_traces(self.palette, record.band),
+            *self._context(),
+            _line(f"Flight {record.number}", curve, self.palette.ink, 2.5, "flight", record.output_unit),
+            *glitch_traces(self.palette, record.number, curve, record.glitches, record.output_unit),
+            *self._deviation(),
+            *self._channels(),
         ]
-        return ready(self, traces, self._layout(palette, curve), summary=self._summary(), table=self._table(curve))
+        return self.ready(traces, summary=self._summary(), table=self._table(), **self._layout())
 
     @property
     def _has_deviation(self) -> bool:
         return is_step(self.record.set_point)
 
-    def _deviation(self, palette: theme.Palette, curve: Curve) -> Iterator[Trace]:
+    def _deviation(self) -> Iterator[Trace]:
         record = self.record
         if not self._has_deviation:
             return
-        deviation = scored_part(deviation_of(curve, record.target), record.set_point)
-        drawn = _line("Deviation", deviation, palette.ink, 1.75, "deviation", record.output_unit)
+        deviation = scored_part(deviation_of(record.curve, record.target), record.set_point)
+        drawn = _line("Deviation", deviation, self.palette.ink, 1.75, "deviation", record.output_unit)
         yield {**drawn, "yaxis": "y2", "showlegend": False}
 
-    def _channels(self, palette: theme.Palette) -> list[Trace]:
-        colours = (palette.ink, *palette.gains)
-        traces: list[Trace] = []
+    def _channels(self) -> Iterator[Trace]:
+        colours = (self.palette.ink, *self.palette.gains)
         for place, panel in enumerate(self.record.panels, start=2 + self._has_deviation):
-            axis: Trace = {"yaxis": f"y{place}"}
-            if len(panel.curves) == 1:
-                axis["showlegend"] = False
+            axis: Trace = {"yaxis": f"y{place}"} | ({"showlegend": False} if len(panel.curves) == 1 else {})
             for index, (title, curve) in enumerate(panel.curves.items()):
                 colour, dash = colours[index % len(colours)], ("solid", "dash", "dot")[index % 3]
-                traces.append({**_line(title, curve, colour, 1.5, "input", panel.unit, dash), **axis})
+                yield _line(title, curve, colour, 1.5, "input", panel.unit, dash) | axis
             if panel.limits is not None:
-                traces += [one | axis for one in _saturated(palette, next(iter(panel.curves.values())), panel.limits)]
-        return traces
+                command = next(iter(panel.curves.values()))
+                yield from (one | axis for one in _saturated(self.palette, command, panel.limits))
 
-    def _layout(self, palette: theme.Palette, curve: Curve) -> dict[str, object]:
+    def _layout(self) -> dict[str, object]:
         """The output on top, twice as high as each panel below it."""
-        record, goal = self.record, self.record.set_point
+        record, curve, goal = self.record, self.record.curve, self.record.set_point
         low, high, _ = robust_span(
             [curve.values], low=min(0.0, float(goal.values.min())), high=max(0.0, float(goal.values.max()))
         )
         places = _places(len(record.panels) + self._has_deviation)
         output = f"{record.output_title} ({record.output_unit})"
-        axes: dict[str, object] = {"yaxis": theme.axis(palette, output, domain=places[0], range=[low, high])}
+        axes: dict[str, object] = {"yaxis": self.palette.axis(output, domain=places[0], range=[low, high])}
         if self._has_deviation:
             axes["yaxis2"] = deviation_axis(
-                palette, scored_deviation_limit(curve, record.target, goal), record.output_unit, domain=places[1]
+                self.palette, scored_deviation_limit(curve, record.target, goal), record.output_unit, domain=places[1]
             )
         for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
-            axes[f"yaxis{place}"] = theme.axis(palette, panel.title, domain=places[place - 1], nticks=4)
+            axes[f"yaxis{place}"] = self.palette.axis(panel.title, domain=places[place - 1], nticks=4)
         lasts_s = float(goal.time_s[-1])
         begin = min(float(curve.time_s[0]), -_FIRST_NAME * lasts_s) - 0.01 * lasts_s
-        axes["xaxis"] = theme.axis(
-            palette,
+        axes["xaxis"] = self.palette.axis(
             "Time since the command (s)",
             anchor=f"y{theme.suffix(len(places))}",
             range=[begin, float(curve.time_s[-1])],
@@ -153,57 +147,53 @@ class FlightFigure:
             spikesnap="cursor",
             spikethickness=1,
             spikedash="solid",
-            spikecolor=palette.dim,
+            spikecolor=self.palette.dim,
             hoverformat=".2f",
             unifiedhovertitle={"text": "%{x} s"},
         )
-        return theme.layout(
-            palette,
-            hovermode="x unified",
-            hoversubplots="axis",
-            shapes=[
-                *(theme.upright(event.time_s, palette.dim, 1, yref="paper") for event in record.events),
-                *(theme.upright(note.time_s, palette.prediction, 1, yref="paper") for note in record.notes),
-            ],
-            annotations=[
-                *_names(palette, record.events, lasts_s),
-                *(_note(palette, note, places[0][0]) for note in record.notes),
-            ],
-            margin=dict(theme.SIGNED_MARGIN_PX),
-            meta={"panels": len(places)},
-            uirevision="flight",
+        return {
             **axes,
-        )
+            "hovermode": "x unified",
+            "hoversubplots": "axis",
+            "shapes": [
+                *(theme.upright(event.time_s, self.palette.dim, 1, yref="paper") for event in record.events),
+                *(theme.upright(note.time_s, self.palette.prediction, 1, yref="paper") for note in record.notes),
+            ],
+            "annotations": [
+                *_names(self.palette, record.events, lasts_s),
+                *(_note(self.palette, note, places[0][0]) for note in record.notes),
+            ],
+            "margin": dict(theme.SIGNED_MARGIN_PX),
+            "meta": {"panels": len(places)},
+        }
 
-    def _context(self, palette: theme.Palette) -> list[Trace]:
+    def _context(self) -> Iterator[Trace]:
         """What the flight is compared with, as far as it is known."""
         record, unit = self.record, self.record.output_unit
-        drawn = [_line("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot")]
+        yield _line("Set point", record.set_point, self.palette.dim, 1.5, "set point", None, "dot")
         if record.reference is not None:
             scored = scored_part(record.reference, record.set_point)
-            drawn.append(_line("Reference", scored, palette.dim, 1.5, "reference", None, "dashdot"))
+            yield _line("Reference", scored, self.palette.dim, 1.5, "reference", None, "dashdot")
         if record.best is not None:
-            drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
-        if record.predicted is not None:
-            drawn.append(
-                _line(record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash")
-            )
-        return drawn
+            yield _line(f"Flight {record.best_number} · best", record.best, self.palette.best, 2, "best", unit)
+        if record.predicted:
+            yield _line(record.predicted_name, record.predicted, self.palette.prediction, 2, "prediction", unit, "dash")
 
     def _summary(self) -> str:
         record = self.record
-        assert record.curve is not None
         peak = int(np.argmax(record.curve.values))
         return (
             f"{record.output_title} of flight {record.number}: highest {record.curve.values[peak]:.2f} "
             f"{record.output_unit} at {record.curve.time_s[peak]:.1f} s."
         )
 
-    def _table(self, curve: Curve) -> Table:
-        record = self.record
-        named = [("measured", "Measured", curve), ("set_point", "Set point", record.set_point)]
-        if record.predicted is not None:
-            named.append(("predicted", record.predicted_name, record.predicted))
+    def _table(self) -> Table:
+        record, curve = self.record, self.record.curve
+        named = (
+            ("measured", "Measured", curve),
+            ("set_point", "Set point", record.set_point),
+            ("predicted", record.predicted_name, record.predicted or None),
+        )
         channels = [
             (title.lower().replace(" ", "_"), title, channel)
             for panel in record.panels
@@ -245,12 +235,11 @@ def _saturated(palette: theme.Palette, command: Curve, limits: Range) -> Iterato
     )
 
 
-def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
+def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float) -> Iterator[dict[str, object]]:
     """The events' names along their lines: the first at the left of its line, the others at the right, over the curves.
 
     Each one that is near the one before it at the same side is below that.
     """
-    names: list[dict[str, object]] = []
     below = 0
     for index, event in enumerate(events):
         if index == 0:
@@ -259,8 +248,7 @@ def _names(palette: theme.Palette, events: Sequence[FlightEvent], lasts_s: float
             is_near = index > 1 and event.time_s - events[index - 1].time_s < _NEAR * lasts_s
             below = below + 1 if is_near else 0
             beside = {"bgcolor": palette.surface, "yshift": -_NAME_PX * below}
-        names.append(_along(event.time_s, event.name, palette.dim, **{"y": 1, "yanchor": "top", **beside}))
-    return names
+        yield _along(event.time_s, event.name, palette.dim, **{"y": 1, "yanchor": "top", **beside})
 
 
 def _note(palette: theme.Palette, note: FlightEvent, bottom: float) -> dict[str, object]:
@@ -281,6 +269,6 @@ def _line(
     """A curve, with hover text in its `unit`, none if that is None."""
     style = theme.line(colour, width, dash)
     if unit is None:
-        return scatter(name, thin_by_bends(curve.time_s, curve.values), role=role, line=style)
+        return scatter(name, thin_by_bends(curve), role=role, line=style)
     hover = f"{name}: %{{y:.3f}} {unit}".rstrip() + "<extra></extra>"
-    return scatter(name, thinned(curve.time_s, curve.values, POINTS), role=role, line=style, hovertemplate=hover)
+    return scatter(name, thinned(curve, POINTS), role=role, line=style, hovertemplate=hover)

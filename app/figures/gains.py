@@ -1,32 +1,28 @@
 """The gains of each flight, one small panel per gain, with the next ones as open diamonds."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from app.core import formatting
 from app.core.policy import Gain
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, ready, scatter
-from app.figures.data import History
+from app.figures.base import CampaignFigure, Card, Column, Table, Trace, scatter
 from app.figures.overlays import MANY
 
-GAP = 0.09
-"""Height between two panels as a share of the whole: room for the title of the lower one."""
 _LETTERS: Final = 48
 """Of a name, on the narrowest screen."""
 
 
 @dataclass(frozen=True, slots=True)
-class GainsFigure:
+class GainsFigure(CampaignFigure):
     """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `proposed`.
 
     Every trace carries `meta`: `role` (flown, best, next) and `gain`. A page puts other gains in the place of `next`.
     """
 
-    history: History
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "gains"
-    title: ClassVar[str] = "Gains per flight"
+    name = "gains"
+    title = "Gains per flight"
 
     def not_ready(self) -> str | None:
         if self.history.flights or self.history.proposal is not None:
@@ -34,28 +30,25 @@ class GainsFigure:
         return "The gains of each flight appear here once the first ones are proposed."
 
     def compute(self) -> Card:
-        palette, history = theme.PALETTES[self.theme_name], self.history
-        panels = list(enumerate(history.gains, start=1))
-        traces = [trace for index, gain in panels for trace in self._panel(palette, index, gain)]
-        axes: dict[str, object] = {}
-        for index, gain in panels:
-            axes |= self._axes(palette, index, gain)
-        layout = theme.layout(
-            palette,
-            showlegend=False,
-            uirevision="gains",
-            margin={**theme.MARGIN_PX, "t": 24, "r": 30},
-            annotations=self._names(palette),
-            **axes,
+        gains, ticks = self.history.gains, theme.flight_ticks(self.history.last_number)
+        return self.ready(
+            [trace for index, gain in enumerate(gains, start=1) for trace in self._panel(index, gain)],
+            summary=self._summary(),
+            table=self._table(),
+            **self.palette.titled_panels("Flight", ticks, list(self._ordinates())),
         )
-        return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _panel(self, palette: theme.Palette, index: int, gain: Gain) -> list[Trace]:
-        colour = palette.gains[(index - 1) % len(palette.gains)]
+    def _panel(self, index: int, gain: Gain) -> Iterator[Trace]:
+        colour = self.palette.gains[(index - 1) % len(self.palette.gains)]
         flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
         axes: dict[str, Any] = {**theme.on(index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
         crowded = len(flights) > MANY
+        marker = theme.solid(
+            colour,
+            size=[13 if flight is best else 7 for flight in flights],
+            symbol=["star" if flight is best else "circle" for flight in flights],
+        )
         flown = scatter(
             gain.title,
             ([flight.number for flight in flights], [flight.gains[gain.name] for flight in flights]),
@@ -63,64 +56,39 @@ class GainsFigure:
             about={"gain": gain.name},
             mode="lines" if crowded else "lines+markers",
             line={**theme.line(colour, 1 if crowded else 2), "shape": "hv"},
-            marker=theme.solid(
-                colour,
-                size=[13 if flight is best else 7 for flight in flights],
-                symbol=["star" if flight is best else "circle" for flight in flights],
-            ),
             hovertemplate=f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
             **axes,
         )
-        drawn = [flown]
-        if crowded:
-            del flown["marker"]
+        yield flown if crowded else flown | {"marker": marker}
         if crowded and best is not None:
             star = {
                 "x": [best.number],
                 "y": [best.gains[gain.name]],
                 "marker": theme.solid(colour, size=13, symbol="star"),
             }
-            drawn.append({**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}})
-        if proposal is None:
-            return drawn
-        following = scatter(
-            f"{gain.title}, next",
-            ([proposal.number], [proposal.gains[gain.name]]),
-            role="next",
-            about={"gain": gain.name},
-            mode="markers",
-            marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-            hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
-            **axes,
-        )
-        return [*drawn, following]
-
-    def _axes(self, palette: theme.Palette, index: int, gain: Gain) -> dict[str, object]:
-        count = len(self.history.gains)
-        values = [flight.gains[gain.name] for flight in (*self.history.flights, *self.history.next_flights)]
-        return theme.panel_axes(
-            palette,
-            (index, count, GAP),
-            "Flight",
-            theme.flight_ticks(self.history.last_number),
-            range=padded(min(values), max(values), gain),
-            nticks=4 if count <= 3 else 3,
-        )
-
-    def _names(self, palette: theme.Palette) -> list[dict[str, object]]:
-        """Name, title and unit of each gain, above its panel; where one would not fit, the titles show under the
-        pointer."""
-        gains = self.history.gains
-        fit = all(len(_label(gain.name, gain.title, gain)) <= _LETTERS for gain in gains)
-        return [
-            theme.note(
-                palette,
-                _label(f"<b>{gain.name}</b>", gain.title if fit else "", gain),
-                y=theme.stacked(index, len(gains), GAP)[1],
-                hovertext=gain.title,
+            yield {**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}}
+        if proposal is not None:
+            yield scatter(
+                f"{gain.title}, next",
+                ([proposal.number], [proposal.gains[gain.name]]),
+                role="next",
+                about={"gain": gain.name},
+                mode="markers",
+                marker={"size": 11, "symbol": "diamond-open", "color": self.palette.prediction, "line": {"width": 2}},
+                hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+                **axes,
             )
-            for index, gain in enumerate(gains, start=1)
-        ]
+
+    def _ordinates(self) -> Iterator[tuple[dict[str, object], dict[str, Any]]]:
+        """Name, title and unit of each gain above its panel, and its ordinate; where one would not fit, the titles show
+        under the pointer."""
+        gains, flights = self.history.gains, (*self.history.flights, *self.history.next_flights)
+        fit = all(len(_label(gain.name, gain.title, gain)) <= _LETTERS for gain in gains)
+        for gain in gains:
+            values = [flight.gains[gain.name] for flight in flights]
+            title = _label(f"<b>{gain.name}</b>", gain.title if fit else "", gain)
+            ordinate = {"range": padded(min(values), max(values), gain), "nticks": 4 if len(gains) <= 3 else 3}
+            yield self.palette.note(title, hovertext=gain.title), ordinate
 
     def _summary(self) -> str:
         best = self.history.best

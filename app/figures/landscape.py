@@ -1,17 +1,18 @@
 """A campaign's gains as a path over the model's error, two gains at a time: a part of the proposal's details."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
-from app.core.policy import Gain, Gains
+from app.core.policy import Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, ready, scatter
-from app.figures.data import FlightData, History
+from app.figures.base import CampaignFigure, Card, Column, Table, Trace, scatter
+from app.figures.data import FlightData
 
 LEVELS: Final = 9
 """Approximate number of contours."""
@@ -45,44 +46,43 @@ def scale_of(slices: Sequence[Slice]) -> Scale:
 
 
 @dataclass(frozen=True, slots=True)
-class LandscapeFigure:
+class LandscapeFigure(CampaignFigure):
     """Table columns: `what`, one per gain, `predicted` and `measured` error; the rows are the flights, the proposal,
     and the lowest point of each slice. `tried` are gains that the strategy evaluated on the model.
 
     Each trace carries in `meta` its role: model, path, best, tried, proposed.
     """
 
-    history: History
     landscape: Landscape
     tried: Sequence[Gains] = ()
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "landscape"
-    title: ClassVar[str] = "Error landscape of the model"
+    name = "landscape"
+    title = "Error landscape of the model"
 
     def not_ready(self) -> str | None:
         return None if self.landscape.slices else "Nothing to draw: fewer than two gains are free."
 
     def compute(self) -> Card:
-        palette, slices = theme.PALETTES[self.theme_name], self.landscape.slices
+        slices = self.landscape.slices
         scale = scale_of(slices)
         traces: list[Trace] = []
         axes: dict[str, object] = {}
         for index, one in enumerate(slices, start=1):
-            drawn = (self._contours(palette, one, scale), *self._marks(palette, one))
+            drawn = (self._contours(one, scale), *self._marks(one))
             traces += [
                 trace | theme.on(index) | {"legendgroup": trace["name"], "showlegend": index == 1} for trace in drawn
             ]
-            axes |= self._axes(palette, index, one)
-        layout = theme.layout(
-            palette,
-            uirevision="landscape",
+            axes |= self._axes(index, one)
+        return self.ready(
+            traces,
+            summary=self._summary(scale),
+            table=self._table(),
             margin={"l": 8, "r": 14, "t": 12, "b": 92},
-            annotations=[self._note(palette, scale)],
+            annotations=[self._note(scale)],
             **axes,
         )
-        return ready(self, traces, layout, summary=self._summary(scale), table=self._table())
 
-    def _contours(self, palette: theme.Palette, one: Slice, scale: Scale) -> Trace:
+    def _contours(self, one: Slice, scale: Scale) -> Trace:
+        best, surface = self.palette.best, self.palette.surface
         return {
             "type": "contour",
             "name": "Predicted error",
@@ -97,22 +97,22 @@ class LandscapeFigure:
                 "size": scale.step,
                 "coloring": "fill",
                 "showlabels": True,
-                "labelfont": {"size": 11, "color": palette.ink},
+                "labelfont": {"size": 11, "color": self.palette.ink},
             },
-            "colorscale": [[place, theme.mixed(palette.best, palette.surface, share)] for place, share in _TINTS],
+            "colorscale": [[place, theme.mixed(best, surface, share)] for place, share in _TINTS],
             "showscale": False,
-            "line": {"width": 0.9, "color": theme.with_opacity(palette.dim, 0.75), "smoothing": 0},
+            "line": {"width": 0.9, "color": theme.with_opacity(self.palette.dim, 0.75), "smoothing": 0},
             "meta": {"role": "model"},
             "hovertemplate": f"{one.x} %{{x:.4~g}}, {one.y} %{{y:.4~g}}<br>"
             f"<b>%{{z:.4f}} {self.history.error_unit}</b> predicted<extra></extra>",
         }
 
-    def _marks(self, palette: theme.Palette, one: Slice) -> Iterator[Trace]:
+    def _marks(self, one: Slice) -> Iterator[Trace]:
         """The flights in order, the best of them, and the gains that were tried and that are proposed."""
         flights, best, proposal = self.history.flights, self.history.best, self.history.proposal
-        edge = {"width": 1.5, "color": palette.surface}
+        edge = {"width": 1.5, "color": self.palette.surface}
         if self.tried:
-            mark = theme.solid(palette.prediction, size=6, symbol="circle-open", line={"width": 1.5})
+            mark = theme.solid(self.palette.prediction, size=6, symbol="circle-open", line={"width": 1.5})
             yield _points(one, self.tried, "tried", "Tried on model", marker=mark)
         if flights:
             yield _points(
@@ -121,29 +121,28 @@ class LandscapeFigure:
                 "path",
                 "Flights in order",
                 mode="lines+markers+text",
-                line=theme.line(palette.ink, 1.5),
-                marker={"size": 7, "color": palette.surface, "line": {"width": 1.5, "color": palette.ink}},
+                line=theme.line(self.palette.ink, 1.5),
+                marker={"size": 7, "color": self.palette.surface, "line": {"width": 1.5, "color": self.palette.ink}},
                 text=self._numbers(one),
                 textposition="top center",
-                textfont={"size": 12, "color": palette.ink, "weight": 700, "shadow": "auto"},
+                textfont={"size": 12, "color": self.palette.ink, "weight": 700, "shadow": "auto"},
                 hovertext=[self._hover_text(flight) for flight in flights],
             )
         if best is not None:
-            mark, text = theme.solid(palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
-            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=text)
+            mark, hover = theme.solid(self.palette.best, size=17, symbol="star", line=edge), [self._hover_text(best)]
+            yield _points(one, [best.gains], "best", f"Best, flight {best.number}", marker=mark, hovertext=hover)
         if proposal is not None:
-            mark = theme.solid(palette.prediction, size=13, symbol="diamond", line=edge)
-            name, text = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
-            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=text)
+            mark = theme.solid(self.palette.prediction, size=13, symbol="diamond", line=edge)
+            name, hover = f"Next, flight {proposal.number}", [f"Flight {proposal.number}, proposed"]
+            yield _points(one, [proposal.gains], "proposed", name, marker=mark, hovertext=hover)
 
     def _numbers(self, one: Slice) -> list[str]:
         """The numbers of the first, the best and the latest flight, in one text where they have the same place."""
         flights, best = self.history.flights, self.history.best
-        leading = sorted({flight.number for flight in (flights[0], best or flights[0], flights[-1])})
-        places = {flight.number: (flight.gains[one.x], flight.gains[one.y]) for flight in flights}
-        shared: dict[tuple[float, float], list[int]] = {}
-        for number in leading:
-            shared.setdefault(places[number], []).append(number)
+        leading = {flight.number: flight for flight in (flights[0], best or flights[0], flights[-1])}
+        shared = defaultdict[tuple[float, float], list[int]](list)
+        for number, flight in sorted(leading.items()):
+            shared[flight.gains[one.x], flight.gains[one.y]].append(number)
         texts = {numbers[0]: ", ".join(map(str, numbers)) for numbers in shared.values()}
         return [texts.get(flight.number, "") for flight in flights]
 
@@ -152,21 +151,21 @@ class LandscapeFigure:
         error = "no error" if flight.error is None else f"{flight.error:.4f} {unit} measured"
         return f"Flight {flight.number}, {error}"
 
-    def _axes(self, palette: theme.Palette, index: int, one: Slice) -> dict[str, object]:
-        titles = {gain.name: _title(gain) for gain in self.history.gains}
+    def _axes(self, index: int, one: Slice) -> dict[str, object]:
+        titles = {gain.name: f"{gain.name} ({gain.unit})" if gain.unit else gain.name for gain in self.history.gains}
         own, up = theme.suffix(index), theme.stacked(index, len(self.landscape.slices), _GAP)
         x: dict[str, object] = {"anchor": f"y{own}", "range": _padded(one.x_values), "nticks": 5, "showgrid": False}
         y = {"anchor": f"x{own}", "range": _padded(one.y_values), "nticks": 6, "showgrid": False, "domain": up}
         return {
-            f"xaxis{own}": theme.axis(palette, titles[one.x], **x),
-            f"yaxis{own}": theme.axis(palette, titles[one.y], **y),
+            f"xaxis{own}": self.palette.axis(titles[one.x], **x),
+            f"yaxis{own}": self.palette.axis(titles[one.y], **y),
         }
 
-    def _note(self, palette: theme.Palette, scale: Scale) -> dict[str, object]:
+    def _note(self, scale: Scale) -> dict[str, object]:
         """Text below the slices: where they lie, and the contour interval."""
         held = ", ".join(f"{name} {value:.4g}" for name, value in self.landscape.centre.items())
         text = f"Slices through {held}<br>contours every {scale.step:g} {self.history.error_unit}"
-        return theme.note(palette, text, y=0, yshift=-52, yanchor="top", align="left")
+        return self.palette.note(text, y=0, yshift=-52, yanchor="top", align="left")
 
     def _summary(self, scale: Scale) -> str:
         pairs = ", ".join(f"{one.y} over {one.x}" for one in self.landscape.slices)
@@ -227,7 +226,3 @@ def _points(
 def _padded(values: Sequence[float]) -> list[float]:
     room = _EDGE * (values[-1] - values[0])
     return [values[0] - room, values[-1] + room]
-
-
-def _title(gain: Gain) -> str:
-    return f"{gain.name} ({gain.unit})" if gain.unit else gain.name

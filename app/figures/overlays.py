@@ -11,8 +11,8 @@ import numpy as np
 from app.core.records.trajectory import Samples
 from app.figures import theme
 from app.figures.base import Trace, reading, scatter
-from app.figures.data import Band, Curve, FlightData, History, Range
-from app.figures.scale import thin_by_bends, thinned
+from app.figures.data import NO_CURVE, Band, Curve, FlightData, History, Range
+from app.figures.scale import Points, thin_by_bends, thinned
 
 GLITCH_POINTS: Final = 60
 Side = Literal["left", "center", "right"]
@@ -23,28 +23,32 @@ def band_traces(palette: theme.Palette, band: Band | None) -> Iterator[Trace]:
     """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
     if band is None:
         return
-    quiet: dict[str, Any] = {
-        "line": theme.line(theme.with_opacity(palette.prediction, 0.35), 0.75),
-        "legendgroup": "band",
-        "legendrank": 900,
-    }
-    lower, upper = (thin_by_bends(curve.time_s, curve.values) for curve in (band.lower, band.upper))
-    fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.prediction, 0.14)}
-    yield scatter("Likely, lower edge", lower, role="band", about={"edge": "lower"}, showlegend=False, **quiet)
-    yield scatter("Likely", upper, role="band", about={"edge": "upper"}, **fill, **quiet)
+    edge, fill = (theme.with_opacity(palette.prediction, opacity) for opacity in (0.35, 0.14))
+    edges = [thin_by_bends(curve) for curve in (band.lower, band.upper)]
+    yield from _filled("band", ("Likely, lower edge", "Likely"), edges, edge, fill, 900)
+
+
+def _filled(
+    role: str, names: tuple[str, str], edges: Sequence[Points], edge: str, fill: str, rank: int
+) -> Iterator[Trace]:
+    """Lower and upper edge in the colour `edge`, and what is between them in the colour `fill`."""
+    (lower, upper), line = edges, theme.line(edge, 0.75)
+    style: dict[str, Any] = {"role": role, "line": line, "legendgroup": role, "legendrank": rank}
+    yield scatter(names[0], lower, about={"edge": "lower"}, showlegend=False, **style)
+    yield scatter(names[1], upper, about={"edge": "upper"}, fill="tonexty", fillcolor=fill, **style)
 
 
 def glitch_traces(
-    palette: theme.Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+    palette: theme.Palette, number: int, curve: Curve, glitches: Sequence[Range], unit: str
 ) -> Iterator[Trace]:
     """The glitches of a flight's record, over its curve: one trace, or none."""
-    if curve is None or not glitches:
+    if not glitches:
         return
     x: list[float | None] = []
     y: list[float | None] = []
     for glitch in glitches:
-        first, end = glitch.slice_of(curve.time_s)  # with the samples just before and after it, so that a gap shows
-        time_s, values = thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)
+        around = slice(*glitch.slice_of(curve.time_s))  # with the samples before and after it, so that a gap shows
+        time_s, values = thinned(curve.part(around), GLITCH_POINTS)
         x, y = [*x, *time_s, None], [*y, *values, None]
     yield scatter(
         f"Flight {number}, glitch",
@@ -83,7 +87,16 @@ def off_scale_traces(
         )
         return [together] if flights else []
     printed = set(_with_room([flight.number for flight in flights], PRINT * last))
-    return [_alone(palette, flight, top, unit, in_print=flight.number in printed) for flight in flights]
+    return [
+        _triangle(
+            f"Flight {flight.number}: {flight.error:.2f} {unit}",
+            (flight.number, top),
+            palette.bad,
+            trial=flight.number,
+            label=f"↑ {flight.error:.2f}" if flight.number in printed else "",
+        )
+        for flight in flights
+    ]
 
 
 def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
@@ -95,30 +108,40 @@ def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
             yield number
 
 
-def _alone(palette: theme.Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
-    text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
+def _triangle(
+    name: str,
+    at: tuple[float, float],
+    colour: str,
+    *,
+    trial: int,
+    label: str,
+    up: bool = True,
+    side: Side = "center",
+    role: str = "off scale",
+    **more: object,
+) -> Trace:
+    """A triangle at the upper or lower edge of the scale, with its label, if any, to the `side` of it."""
     return scatter(
-        text,
-        ([flight.number], [top]),
-        role="off scale",
-        about={"trial": flight.number},
-        mode="markers+text" if in_print else "markers",
-        text=[f"↑ {flight.error:.2f}" if in_print else ""],
-        textposition="bottom center",
+        name,
+        ([at[0]], [at[1]]),
+        role=role,
+        about={"trial": trial},
+        mode="markers+text" if label else "markers",
+        text=[label],
+        textposition=f"{'bottom' if up else 'top'} {side}",
+        marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
+        textfont={"color": colour, "shadow": "auto"},  # curves may cross it: with an outline in the opposite tone
         showlegend=False,
-        marker={"symbol": "triangle-up", "size": 12, "color": palette.bad},
-        textfont=_readable(palette.bad),
         cliponaxis=False,
-        hovertemplate=f"{text}<extra></extra>",
+        hovertemplate=f"{name}<extra></extra>",
+        **more,
     )
 
 
-def part_off_scale(curve: Curve, low: float, high: float, window: Range) -> Curve | None:
-    """The part of a curve in the visible time range `window`, if it leaves the scale `low` … `high`; else None."""
-    visible = (window.low <= curve.time_s) & (curve.time_s <= window.high)
-    part = Curve(curve.time_s[visible], curve.values[visible])
-    leaves = len(part.values) > 0 and (part.values.max() > high or part.values.min() < low)
-    return part if leaves else None
+def part_off_scale(curve: Curve, low: float, high: float, window: Range) -> Curve:
+    """The part of a curve in the visible time range `window`, if it leaves the scale `low` … `high`; else no curve."""
+    part = curve.part((window.low <= curve.time_s) & (curve.time_s <= window.high))
+    return part if part and (part.values.max() > high or part.values.min() < low) else NO_CURVE
 
 
 def leaves_upward(values: Samples, low: float, high: float) -> bool:
@@ -141,39 +164,24 @@ def off_scale(
     trial: int,
     text: str,
     unit: str,
-    role: str = "off scale",
     digits: int = 1,
-    side: Side | None = "center",
-    **more: object,
+    **more: Any,
 ) -> Trace:
-    """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value.
-
-    The label is to the `side` of the triangle; there is none for None.
-    """
+    """A triangle at the edge where a flight leaves the scale `low` … `high`: with its `label`, if there is one, also
+    its peak value is printed."""
     values = curve.values
     up = leaves_upward(values, low, high)
     peak = int(values.argmax() if up else values.argmin())
     name = f"{text} reaches {signed(values[peak], 2)} {unit} at {curve.time_s[peak]:.1f} s"
-    return scatter(
+    return _triangle(
         name,
-        ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
-        role=role,
-        about={"trial": trial},
-        mode="markers" if side is None else "markers+text",
-        text=["" if side is None else f"{label} {'↑' if up else '↓'} {signed(values[peak], digits)}\u00a0{unit}"],
-        textposition=f"{'bottom' if up else 'top'} {side or 'center'}",
-        marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
-        textfont=_readable(colour),
-        showlegend=False,
-        cliponaxis=False,
-        hovertemplate=f"{name}<extra></extra>",
+        (round(float(curve.time_s[peak]), 3), high if up else low),
+        colour,
+        trial=trial,
+        label=label and f"{label} {'↑' if up else '↓'} {signed(values[peak], digits)}\u00a0{unit}",
+        up=up,
         **more,
     )
-
-
-def _readable(colour: str) -> dict[str, str]:
-    """The font of a label that curves may cross: with an outline in the opposite tone."""
-    return {"color": colour, "shadow": "auto"}
 
 
 MAX_INDIVIDUAL_FLIGHTS: Final = 30
@@ -190,14 +198,13 @@ _EARLY_SHARE: Final = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """The band that contains 80 % of `flights` at each time, and their median curve."""
+    """Curves below which lie 10, 50 and 90 % of `flights` at each time (`PERCENTILES`)."""
 
-    band: Band
-    median: Curve
+    curves: tuple[Curve, ...]
     flights: int
 
 
-def select_individual_flights(history: History, chosen: int | None = None) -> frozenset[int]:
+def select_individual_flights(history: History) -> frozenset[int]:
     """Numbers of the flights drawn as individual curves.
 
     All, if there are few; of many, the first, the best and the next best, the latest, and the `chosen` one.
@@ -206,7 +213,7 @@ def select_individual_flights(history: History, chosen: int | None = None) -> fr
         return frozenset(flight.number for flight in history.flights)
     ranked = sorted(history.valid, key=lambda flight: (flight.error, flight.number))
     emphasised = [*history.flights[:1], *history.flights[-LATEST:], *ranked[: NEAR_BEST + 1]]
-    asked = [flight for flight in history.flights if flight.number == chosen]
+    asked = [flight for flight in history.flights if flight.number == history.chosen]
     return frozenset(flight.number for flight in (*emphasised, *asked))
 
 
@@ -215,28 +222,23 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
 
     Times are denser while the flights climb; after the end of a record its last value holds.
     """
-    curves = [flight.curve for flight in flights if flight.outcome == "valid" and flight.curve is not None]
-    curves = [curve for curve in curves if len(curve.time_s)]
+    curves = [flight.curve for flight in flights if flight.outcome == "valid" and flight.curve]
     if not curves:
         return None
     early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)
     instants = np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
     table = np.array([np.interp(instants, curve.time_s, curve.values) for curve in curves])
-    lower, middle, upper = np.percentile(table, PERCENTILES, axis=0)
-    band = Band(lower=Curve(instants, lower), upper=Curve(instants, upper))
-    return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
+    parts = np.percentile(table, PERCENTILES, axis=0)
+    return Envelope(curves=tuple(Curve(instants, values) for values in parts), flights=len(curves))
 
 
 def envelope_traces(palette: theme.Palette, envelope: Envelope | None, unit: str) -> Iterator[Trace]:
     """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
     if envelope is None:
         return
-    edge: dict[str, Any] = {"line": theme.line(palette.earlier, 0.75), "legendgroup": "envelope", "legendrank": 800}
-    fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.earlier, 0.3)}
-    name = f"80\u00a0% of {envelope.flights} flights"
-    lower, upper, median = map(_points, (envelope.band.lower, envelope.band.upper, envelope.median))
-    yield scatter("Lower edge", lower, role="envelope", about={"edge": "lower"}, showlegend=False, **edge)
-    yield scatter(name, upper, role="envelope", about={"edge": "upper"}, **fill, **edge)
+    lower, median, upper = map(_points, envelope.curves)
+    names, fill = ("Lower edge", f"80\u00a0% of {envelope.flights} flights"), theme.with_opacity(palette.earlier, 0.3)
+    yield from _filled("envelope", names, (lower, upper), palette.earlier, fill, 800)
     yield scatter(
         "Median",
         median,
@@ -249,5 +251,5 @@ def envelope_traces(palette: theme.Palette, envelope: Envelope | None, unit: str
     )
 
 
-def _points(curve: Curve) -> tuple[list[float], list[float]]:
+def _points(curve: Curve) -> Points:
     return [round(at, 3) for at in curve.time_s.tolist()], [round(value, 4) for value in curve.values.tolist()]

@@ -3,12 +3,12 @@ by signal (the paper's Fig. 6).
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
+from app.figures.base import Card, Cell, Column, Figure, Table, Trace, scatter
 
 Style = Literal[
     "goal", "reference", "measured", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
@@ -57,15 +57,14 @@ class Plot:
 
 
 @dataclass(frozen=True, slots=True)
-class PanelsFigure:
+class PanelsFigure(Figure):
     """Table columns: `x`, then one for each line of each panel.
 
     Every trace carries `meta`: `role` is its style, `panel` its position from 1, `line` its name.
     """
 
     plot: Plot
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "panels"
+    name = "panels"
 
     @property
     def title(self) -> str:
@@ -75,20 +74,26 @@ class PanelsFigure:
         return None if any(panel.lines for panel in self.plot.panels) else "Nothing to draw."
 
     def compute(self) -> Card:
-        palette, plot = theme.PALETTES[self.theme_name], self.plot
+        plot = self.plot
         axes: dict[str, object] = {}
         traces: list[Trace] = []
         named: set[str] = set()
         for number, panel in enumerate(plot.panels, start=1):
-            axes |= self._axes(palette, number, panel)
+            axes |= self._axes(number, panel)
             for line in panel.lines:
-                traces.append(self._trace(palette, number, panel, line, in_legend=line.name not in named))
+                traces.append(self._trace(number, panel, line, in_legend=line.name not in named))
                 named.add(line.name)
-        layout = theme.layout(palette, uirevision=plot.title, showlegend=len(named) > 1, **axes)
-        return ready(self, traces, layout, summary=plot.summary, table=self._table())
+        return self.ready(
+            traces,
+            summary=plot.summary,
+            table=self._table(),
+            uirevision=plot.title,
+            showlegend=len(named) > 1,
+            **axes,
+        )
 
-    def _trace(self, palette: theme.Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
-        colour, width, dash = _pen(palette, line.style)
+    def _trace(self, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
+        colour, width, dash = _pen(self.palette, line.style)
         drawn: dict[str, object] = (
             {"mode": "markers", "marker": theme.solid(colour, size=7), "cliponaxis": False}
             if line.marks
@@ -109,12 +114,11 @@ class PanelsFigure:
             | drawn
         )
 
-    def _axes(self, palette: theme.Palette, number: int, panel: Panel) -> dict[str, object]:
+    def _axes(self, number: int, panel: Panel) -> dict[str, object]:
         count = len(self.plot.panels)
         x = {} if self.plot.x_range is None else {"range": list(self.plot.x_range)}
         y = {} if panel.y_range is None else {"range": list(panel.y_range)}
-        return theme.panel_axes(
-            palette,
+        return self.palette.panel_axes(
             (number, count, GAP),
             self.plot.x_title,
             x,
@@ -163,7 +167,7 @@ def _at(line: Line, x: float, digits: int) -> Cell:
 def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
     """Colour, width and dash."""
     _, orange, blue = palette.gains
-    pens: dict[Style, tuple[str, float, str]] = {
+    return {
         "goal": (palette.dim, 1.5, "dot"),
         "reference": (palette.dim, 1.5, "dashdot"),
         "measured": (palette.ink, 2, "solid"),
@@ -181,5 +185,4 @@ def _pen(palette: theme.Palette, style: Style) -> tuple[str, float, str]:
         "run 4": (palette.prediction, 2, "dashdot"),
         "run 5": (palette.best, 3, "solid"),
         "run 6": (palette.bad, 2, "longdash"),
-    }
-    return pens[style]
+    }[style]

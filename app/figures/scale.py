@@ -7,8 +7,10 @@ from typing import Final
 import numpy as np
 
 from app.core.records.trajectory import Samples, select_bends, select_samples
-from app.figures.data import Range
+from app.figures.data import Curve, Range
 
+Points = tuple[list[float], list[float]]
+"""Times and values to be drawn."""
 MARGIN = 0.06
 SMOOTH: Final = 1e-3
 """Allowed deviation of a drawn line from a smooth curve, as a share of its span: about a third of a pixel."""
@@ -51,30 +53,28 @@ def span_around(goal: Samples, curves: Sequence[Samples], *, headroom: float = 1
     return robust_span(curves, low=low, high=high)
 
 
-def thinned(
-    time_s: Samples, values: Samples, points: int, window: Range | None = None
-) -> tuple[list[float], list[float]]:
+def thinned(curve: Curve, points: int, window: Range | None = None) -> Points:
     """At most `points` samples that preserve the curve's shape and extremes.
 
     Times are rounded to 0.1 ms, values to four decimals, or five if the curve stays below 1. With a `window` of
     seconds, as many again inside it, up to its edges and just past them.
     """
-    chosen = select_samples(time_s, values, points)
+    chosen = select_samples(curve.time_s, curve.values, points)
     if window is not None:
-        first, end = window.slice_of(time_s)
-        inside = first + select_samples(time_s[first:end], values[first:end], points).astype(np.int64)
+        first, end = window.slice_of(curve.time_s)
+        seen = curve.part(slice(first, end))
+        inside = first + select_samples(seen.time_s, seen.values, points).astype(np.int64)
         chosen = np.concatenate([chosen[chosen < first], inside.astype(np.uint64), chosen[chosen >= end]])
-    return _short(time_s[chosen], values[chosen])
+    return _short(curve.part(chosen))
 
 
-def thin_by_bends(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
+def thin_by_bends(curve: Curve) -> Points:
     """The samples at which a smooth curve bends, for a line without hover text."""
-    near = select_samples(time_s, values, SMOOTH_POINTS)
-    time_s, values = time_s[near], values[near]
-    chosen = select_bends(time_s, values, SMOOTH * float(np.ptp(values)) if len(values) else 0.0)
-    return _short(time_s[chosen], values[chosen])
+    near = curve.part(select_samples(curve.time_s, curve.values, SMOOTH_POINTS))
+    tolerance = SMOOTH * float(np.ptp(near.values)) if near else 0.0
+    return _short(near.part(select_bends(near.time_s, near.values, tolerance)))
 
 
-def _short(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
-    digits = 4 if len(values) == 0 or float(np.abs(values).max()) >= 1.0 else 5
-    return [round(t, 4) for t in time_s.tolist()], [round(v, digits) for v in values.tolist()]
+def _short(curve: Curve) -> Points:
+    digits = 4 if not curve or float(np.abs(curve.values).max()) >= 1.0 else 5
+    return [round(t, 4) for t in curve.time_s.tolist()], [round(v, digits) for v in curve.values.tolist()]

@@ -4,12 +4,13 @@ best emphasised, the next one's prediction dashed.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, cast
+from itertools import chain
+from typing import Any, Final, cast
 
 from app.core.formatting import count, short
 from app.figures import theme
-from app.figures.base import Card, Table, Trace, reading, ready, scatter, table_of_curves
-from app.figures.data import Curve, FlightData, History, Range
+from app.figures.base import CampaignFigure, Card, NamedCurve, Table, Trace, reading, scatter, table_of_curves
+from app.figures.data import Curve, FlightData, Range
 from app.figures.deviations import (
     changes_of,
     deviation_axis,
@@ -50,7 +51,7 @@ TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 1
 
 
 @dataclass(frozen=True, slots=True)
-class TrajectoriesFigure:
+class TrajectoriesFigure(CampaignFigure):
     """Table columns: `time_s`, `set_point`, `reference` (if known), `envelope_lower`, `envelope_middle` and
     `envelope_upper` (with many flights), `flight_N` for each flight drawn individually, and `prediction` (if there is
     one) with `prediction_lower` and `prediction_upper` (if its band is known), at those `TABLE_TIMES_S` that lie within
@@ -69,45 +70,44 @@ class TrajectoriesFigure:
     the output.
     """
 
-    history: History
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "takeoffs"
+    name = "takeoffs"
 
     @property
     def title(self) -> str:
         return self.history.curves_title
 
-    def not_ready(self) -> str | None:
-        return None
-
     def compute(self) -> Card:
-        palette, history = theme.PALETTES[self.theme_name], self.history
-        emphasised = select_individual_flights(history, history.chosen)
-        recorded = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
+        history = self.history
+        emphasised = select_individual_flights(history)
+        recorded = [flight for flight in history.flights if flight.curve]
         drawn = [flight for flight in recorded if flight.number in emphasised]
         in_order = sorted(drawn, key=lambda flight: (_ORDER.index(history.standing_of(flight)), flight.number))
         envelope = envelope_of(recorded, self._lasts_s) if len(drawn) < len(recorded) else None
         points = max(60, min(CURVE_POINTS, ALL_POINTS // max(1, len(drawn))))
         traces = [
-            *envelope_traces(palette, envelope, history.output_unit),
-            *band_traces(palette, None if history.proposal is None else history.proposal.band),
-            *self._goals(palette),
-            *self._altitude_limit(palette),
+            *envelope_traces(self.palette, envelope, history.output_unit),
+            *band_traces(self.palette, None if history.proposal is None else history.proposal.band),
+            *self._goals(),
+            *self._altitude_limit(),
+            *self._deviations(in_order),
+            *(self._flight(flight, points) for flight in in_order),
+            *chain.from_iterable(
+                glitch_traces(self.palette, flight.number, flight.curve, flight.glitches, history.output_unit)
+                for flight in drawn
+            ),
+            *self._legend(drawn),
+            *self._prediction(),
+            self._empty("live", "Flying now"),
+            self._empty("pointed", "Pointed at"),
         ]
         low, high, outside = self._span(drawn)
-        traces += self._deviations(palette, in_order)
-        traces += [self._flight(palette, flight, points) for flight in in_order]
-        for flight in drawn:
-            traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
-        traces += [*self._legend(palette, drawn), *self._prediction(palette)]
-        traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
-        leaving_top = self._off_scale(palette, [drawn[index] for index in outside if index < len(drawn)], low, high)
+        leaving_top = self._off_scale([drawn[index] for index in outside if index < len(drawn)], low, high)
         leaving = []
         if is_step(history.set_point):
             # Plotly places an axis only if it has a trace with a point, even a missing one.
-            traces.append(self._empty(palette, "live deviation", "Flying now, deviation", ([None], [None]), yaxis="y2"))
+            traces.append(self._empty("live deviation", "Flying now, deviation", ([None], [None]), yaxis="y2"))
             leaving = off_scale_deviations(
-                palette,
+                self.palette,
                 drawn,
                 history.target,
                 self._deviation_limit,
@@ -115,18 +115,17 @@ class TrajectoriesFigure:
                 window=self._visible,
             )
         traces += [*leaving_top, *leaving]
-        layout = theme.layout(
-            palette,
-            **self._axes(palette, low, high),
+        return self.ready(
+            _with_uids(traces),
+            summary=self._summary(len(leaving_top), len(leaving)),
+            table=self._table(drawn, envelope),
+            **self._axes(low, high),
             margin=dict(theme.SIGNED_MARGIN_PX),
             meta={
                 "whole_s": self._whole_s,
                 "opening": "Steps" if changes_of(history.set_point) else f"First {OPENING_S[1]:g} s",
             },
-            uirevision="takeoffs",
         )
-        summary = self._summary(len(leaving_top), len(leaving))
-        return ready(self, _with_uids(traces), layout, summary=summary, table=self._table(drawn, envelope))
 
     @property
     def _lasts_s(self) -> float:
@@ -147,36 +146,32 @@ class TrajectoriesFigure:
     def _whole_s(self) -> list[float]:
         return [-0.01 * self._lasts_s, self._lasts_s]
 
-    def _axes(self, palette: theme.Palette, low: float, high: float) -> dict[str, object]:
+    def _axes(self, low: float, high: float) -> dict[str, object]:
         """The output on top, its deviation from the set point below it, over one axis of time."""
         history, unit = self.history, self.history.output_unit
         both = is_step(history.set_point)
         place = [DEVIATION_SHARE + _PANEL_GAP, 1.0] if both else [0.0, 1.0]
         axes: dict[str, object] = {
-            "xaxis": theme.axis(
-                palette, "Time since the command (s)", range=self._opening_s, anchor="y2" if both else "y"
+            "xaxis": self.palette.axis(
+                "Time since the command (s)", range=self._opening_s, anchor="y2" if both else "y"
             ),
-            "yaxis": theme.axis(palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7),
+            "yaxis": self.palette.axis(f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7),
         }
         if both:
-            axes["yaxis2"] = deviation_axis(palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])
+            axes["yaxis2"] = deviation_axis(self.palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])
         return axes
 
-    def _off_scale(self, palette: theme.Palette, flights: list[FlightData], low: float, high: float) -> list[Trace]:
+    def _off_scale(self, flights: list[FlightData], low: float, high: float) -> list[Trace]:
         """Marks of the flights that leave the upper panel in the visible time range."""
-        parts = (
-            (flight.number, part_off_scale(flight.curve, low, high, self._visible))
-            for flight in flights
-            if flight.curve is not None
-        )
+        parts = ((flight.number, part_off_scale(flight.curve, low, high, self._visible)) for flight in flights)
         unit = self.history.output_unit
         return [
-            off_scale(str(number), part, low, high, palette.bad, trial=number, text=f"Flight {number}", unit=unit)
+            off_scale(str(number), part, low, high, self.palette.bad, trial=number, text=f"Flight {number}", unit=unit)
             for number, part in parts
-            if part is not None
+            if part
         ]
 
-    def _deviations(self, palette: theme.Palette, drawn: list[FlightData]) -> Iterator[Trace]:
+    def _deviations(self, drawn: list[FlightData]) -> Iterator[Trace]:
         """Output − target of each flight and of the prediction, in the lower panel."""
         if not is_step(self.history.set_point):
             return
@@ -188,7 +183,7 @@ class TrajectoriesFigure:
                 name,
                 deviation_of(curve, self.history.target),
                 points,
-                line=theme.line_of(palette, look),
+                line=self.palette.line_of(look),
                 showlegend=False,
                 yaxis="y2",
                 hovertemplate=reading(title, self.history.output_unit, form="+.3f"),
@@ -196,19 +191,18 @@ class TrajectoriesFigure:
             )
 
         for flight in drawn:
-            if flight.curve is not None:
-                name, standing = f"Flight {flight.number}, deviation", self.history.standing_of(flight)
-                yield deviation(
-                    name,
-                    name,
-                    flight.curve,
-                    standing,
-                    role="deviation",
-                    about={"trial": flight.number, "standing": standing},
-                    uid=f"deviation-{flight.number}",
-                    legendgroup=standing,
-                )
-        if proposal is not None and proposal.curve is not None:
+            name, standing = f"Flight {flight.number}, deviation", self.history.standing_of(flight)
+            yield deviation(
+                name,
+                name,
+                flight.curve,
+                standing,
+                role="deviation",
+                about={"trial": flight.number, "standing": standing},
+                uid=f"deviation-{flight.number}",
+                legendgroup=standing,
+            )
+        if proposal is not None and proposal.curve:
             yield deviation(
                 f"{proposal.curve_name}: deviation",
                 f"Flight {proposal.number}, {proposal.curve_name.lower()}: deviation",
@@ -223,17 +217,15 @@ class TrajectoriesFigure:
     def _deviation_limit(self) -> float:
         """Contains the best, the latest valid and the next flight."""
         shown = [self.history.best, *self.history.valid[-1:], self.history.proposal]
-        curves = [one.curve for one in shown if one is not None and one.curve is not None]
-        return deviation_limit(curves, self.history.target)
+        return deviation_limit([one.curve for one in shown if one is not None], self.history.target)
 
     def _span(self, drawn: list[FlightData]) -> RobustSpan:
         """From the ground to above the set point; if the set point is zero, the range of the first flight."""
         shown = (*drawn, *self.history.next_flights)
-        curves = [flight.curve.values for flight in shown if flight.curve is not None]
+        curves = [flight.curve.values for flight in shown if flight.curve]
         return span_around(self.history.set_point.values, curves, headroom=HEADROOM)
 
-    def _flight(self, palette: theme.Palette, flight: FlightData, points: int) -> Trace:
-        assert flight.curve is not None
+    def _flight(self, flight: FlightData, points: int) -> Trace:
         standing = self.history.standing_of(flight)
         label = {
             "best": f"{flight.number} · {'best' if self.history.is_best_of_best_gains else 'lowest error'}",
@@ -251,14 +243,14 @@ class TrajectoriesFigure:
             role="flight",
             about={"trial": flight.number, "standing": standing},
             uid=f"flight-{flight.number}",
-            line=theme.line_of(palette, standing),
+            line=self.palette.line_of(standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
             showlegend=standing not in SHARED_LEGEND,
             hovertemplate=reading(f"Flight {label}", self.history.output_unit, error),
         )
 
-    def _legend(self, palette: theme.Palette, drawn: list[FlightData]) -> list[Trace]:
+    def _legend(self, drawn: list[FlightData]) -> list[Trace]:
         """One entry for all flights that look alike, so that the legend does not grow with every flight."""
         standings = {self.history.standing_of(flight) for flight in drawn}
         return [
@@ -267,7 +259,7 @@ class TrajectoriesFigure:
                 ([None], [None]),
                 role="legend",
                 about={"standing": standing},
-                line=theme.line_of(palette, standing),
+                line=self.palette.line_of(standing),
                 legendgroup=standing,
                 legendrank=800,
             )
@@ -275,22 +267,22 @@ class TrajectoriesFigure:
             if standing in standings
         ]
 
-    def _goals(self, palette: theme.Palette) -> list[Trace]:
+    def _goals(self) -> list[Trace]:
         """Set point, and reference if it is known."""
         goals = (("Set point", self.history.set_point, "dot"), ("Reference", self.history.reference, "dashdot"))
         return [
             scatter(
                 name,
-                thin_by_bends(curve.time_s, curve.values),
+                thin_by_bends(curve),
                 role="target" if curve is self.history.target else name.lower(),
-                line=theme.line(palette.dim, 1.5, dash),
+                line=theme.line(self.palette.dim, 1.5, dash),
                 legendrank=900 + place,
             )
             for place, (name, curve, dash) in enumerate(goals)
             if curve is not None
         ]
 
-    def _altitude_limit(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _altitude_limit(self) -> Iterator[Trace]:
         limit_m = self.history.altitude_limit_m
         if limit_m is None:
             return
@@ -298,14 +290,14 @@ class TrajectoriesFigure:
             "Altitude limit: abort",
             (self._whole_s, [limit_m, limit_m]),
             role="limit",
-            line=theme.line(palette.bad, 2, "longdashdot"),
+            line=theme.line(self.palette.bad, 2, "longdashdot"),
             legendrank=901,
             visible=False,
         )
 
-    def _prediction(self, palette: theme.Palette) -> Iterator[Trace]:
+    def _prediction(self) -> Iterator[Trace]:
         proposal = self.history.proposal
-        if proposal is None or proposal.curve is None:
+        if proposal is None or not proposal.curve:
             return
         yield self._trace(
             proposal.curve_name,
@@ -314,14 +306,13 @@ class TrajectoriesFigure:
             role="prediction",
             about={"trial": proposal.number},
             uid="prediction",
-            line=theme.line_of(palette, "prediction"),
+            line=self.palette.line_of("prediction"),
             legendrank=899,
             hovertemplate=reading(f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit),
         )
 
     def _empty(
         self,
-        palette: theme.Palette,
         role: str,
         name: str,
         points: tuple[list[None], list[None]] = ([], []),
@@ -333,7 +324,7 @@ class TrajectoriesFigure:
             points,
             role=role,
             showlegend=False,
-            line=theme.line(palette.ink, 3.5),
+            line=theme.line(self.palette.ink, 3.5),
             legendrank=1,
             cliponaxis=True,
             hovertemplate=reading(name, self.history.output_unit),
@@ -344,7 +335,7 @@ class TrajectoriesFigure:
         self, name: str, curve: Curve, points: int, *, role: str, about: Mapping[str, object], **style: Any
     ) -> Trace:
         each = points // 2 if self.history.window is None else points
-        drawn = thinned(curve.time_s, curve.values, each, self._visible)
+        drawn = thinned(curve, each, self._visible)
         return scatter(name, drawn, role=role, about=about, **style)
 
     def _summary(self, outside: int, leaving: int) -> str:
@@ -359,21 +350,17 @@ class TrajectoriesFigure:
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
         history, proposal = self.history, self.history.proposal
-        named = [("set_point", "Set point", history.set_point)]
-        if history.reference is not None:
-            named.append(("reference", "Reference", history.reference))
+        named: list[NamedCurve] = [
+            ("set_point", "Set point", history.set_point),
+            ("reference", "Reference", history.reference),
+        ]
         if envelope is not None:
-            curves = (envelope.band.lower, envelope.median, envelope.band.upper)
             named += [
                 (f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", curve)
-                for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
+                for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, envelope.curves, strict=True)
             ]
-        named += [
-            (f"flight_{flight.number}", f"Flight {flight.number}", flight.curve)
-            for flight in drawn
-            if flight.curve is not None
-        ]
-        if proposal is not None and proposal.curve is not None:
+        named += [(f"flight_{flight.number}", f"Flight {flight.number}", flight.curve) for flight in drawn]
+        if proposal is not None and proposal.curve:
             title = f"Flight {proposal.number}, {proposal.curve_name.lower()}"
             named.append(("prediction", title, proposal.curve))
             if proposal.band is not None:

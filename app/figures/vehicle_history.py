@@ -2,19 +2,19 @@
 the voltage before and after each flight, by battery.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from itertools import chain
+from typing import Final
 
 from app.core.experiments.base import Fitted
 from app.core.formatting import count
 from app.core.statistics.drift import MONITORED_PARAMETERS
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, Trace, literal, ready, scatter
+from app.figures.base import Card, Cell, Column, Figure, Table, Trace, literal, scatter
 
 REACH: Final = 1.96
 """Half width of a 95 % interval, in standard errors."""
-_GAP: Final = 0.09
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationFigure:
+class CalibrationFigure(Figure):
     """Table columns: `flight`, `campaign`, `trial`, then each parameter with its standard error.
 
     `since` is the flight after which the vehicle was last tuned, drawn as a line in every panel.
@@ -37,9 +37,8 @@ class CalibrationFigure:
     points: tuple[Point, ...]
     since: int | None
     verdict: str
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "calibration"
-    title: ClassVar[str] = "Calibration history"
+    name = "calibration"
+    title = "Calibration history"
 
     def not_ready(self) -> str | None:
         if self.points:
@@ -47,62 +46,43 @@ class CalibrationFigure:
         return "The model's fitted parameters appear here once a campaign with the calibrated model has flown."
 
     def compute(self) -> Card:
-        palette = theme.PALETTES[self.theme_name]
         names = [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
         first = {name: next(point.fitted[name] for point in self.points if name in point.fitted) for name in names}
         ticks = theme.flight_ticks(max(point.flight for point in self.points))
-        axes: dict[str, object] = {}
-        titles = []
-        for index, fitted in enumerate(first.values(), start=1):
-            place, unit = (index, len(names), _GAP), f" ({fitted.unit})" if fitted.unit else ""
-            title = f"<b>{fitted.title}</b>{unit}"
-            axes |= theme.panel_axes(palette, place, "Flight of this vehicle", ticks, nticks=4, rangemode="normal")
-            titles.append(theme.note(palette, title, y=theme.stacked(*place)[1]))
-        layout = theme.layout(
-            palette,
-            showlegend=False,
-            uirevision="calibration",
-            margin={**theme.MARGIN_PX, "t": 24, "r": 30},
-            annotations=titles,
-            shapes=self._tuned(palette, len(names)),
-            **axes,
-        )
-        return ready(
-            self,
-            [self._panel(palette, index, name) for index, name in enumerate(names, start=1)],
-            layout,
+        titles = [f"<b>{one.title}</b>" + (f" ({one.unit})" if one.unit else "") for one in first.values()]
+        panels = [(self.palette.note(title), {"nticks": 4, "rangemode": "normal"}) for title in titles]
+        return self.ready(
+            [self._panel(index, name) for index, name in enumerate(names, start=1)],
             summary=f"Bars are 95 % intervals. {self.verdict}",
             table=self._table(first),
+            shapes=self._tuned(len(names)),
+            **self.palette.titled_panels("Flight of this vehicle", ticks, panels),
         )
 
-    def _panel(self, palette: theme.Palette, index: int, name: str) -> Trace:
+    def _panel(self, index: int, name: str) -> Trace:
         shown = [point for point in self.points if name in point.fitted]
-        first = shown[0].fitted[name]
+        fitted = [point.fitted[name] for point in shown]
         return scatter(
-            first.title,
-            ([point.flight for point in shown], [point.fitted[name].value for point in shown]),
+            fitted[0].title,
+            ([point.flight for point in shown], [each.value for each in fitted]),
             role="fitted",
             about={"parameter": name},
             mode="markers",
             **theme.on(index),
-            error_y={
-                "type": "data",
-                "array": [REACH * point.fitted[name].standard_error for point in shown],
-                "color": palette.dim,
-                "thickness": 1.5,
-                "width": 4,
-            },
-            marker=theme.solid(palette.best, size=8),
+            error_y=theme.bars(
+                self.palette.dim, 1.5, 4, type="data", array=[REACH * each.standard_error for each in fitted]
+            ),
+            marker=theme.solid(self.palette.best, size=8),
             text=[f"campaign {point.campaign_id}, flight {point.trial_number}" for point in shown],
             hovertemplate=f"<b>Flight %{{x}} of the vehicle</b> (%{{text}})<br>%{{y:.4g}} ± %{{error_y.array:.2g}} "
-            f"{first.unit}<extra></extra>",
+            f"{fitted[0].unit}<extra></extra>",
         )
 
-    def _tuned(self, palette: theme.Palette, panels: int) -> list[dict[str, object]]:
+    def _tuned(self, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
         return [
-            theme.upright(self.since, palette.prediction, 1.5, xref=f"x{suffix}", yref=f"y{suffix} domain")
+            theme.upright(self.since, self.palette.prediction, 1.5, xref=f"x{suffix}", yref=f"y{suffix} domain")
             for suffix in map(theme.suffix, range(1, panels + 1))
         ]
 
@@ -114,14 +94,13 @@ class CalibrationFigure:
         ]
         for name, one in first.items():
             columns += [Column(name, one.title, one.unit), Column(f"{name}_se", "Standard error", one.unit)]
-        rows: list[tuple[Cell, ...]] = []
-        for point in self.points:
-            cells: list[Cell] = [point.flight, point.campaign_id, point.trial_number]
-            for name in first:
-                fitted = point.fitted.get(name)
-                cells += [None, None] if fitted is None else [fitted.value, fitted.standard_error]
-            rows.append(tuple(cells))
-        return Table(tuple(columns), tuple(rows))
+        return Table(tuple(columns), tuple(_row(point, first) for point in self.points))
+
+
+def _row(point: Point, names: Iterable[str]) -> tuple[Cell, ...]:
+    fits = [point.fitted.get(name) for name in names]
+    estimates = [(None, None) if fit is None else (fit.value, fit.standard_error) for fit in fits]
+    return (point.flight, point.campaign_id, point.trial_number, *chain(*estimates))
 
 
 _BEFORE_PX: Final = 14
@@ -140,13 +119,12 @@ class BatteryFlight:
 
 
 @dataclass(frozen=True, slots=True)
-class BatteriesFigure:
+class BatteriesFigure(Figure):
     """Table columns: `flight`, `battery`, `before`, `after`. A line connects each voltage before with the one after."""
 
     flights: tuple[BatteryFlight, ...]
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "batteries"
-    title: ClassVar[str] = "Batteries"
+    name = "batteries"
+    title = "Batteries"
 
     def not_ready(self) -> str | None:
         if any(flight.before_v is not None or flight.after_v is not None for flight in self.flights):
@@ -154,18 +132,7 @@ class BatteriesFigure:
         return "Voltages before and after each flight appear here once a flight has reported them."
 
     def compute(self) -> Card:
-        palette = theme.PALETTES[self.theme_name]
         labels = list(dict.fromkeys(flight.battery for flight in self.flights))
-        layout = theme.layout(
-            palette,
-            uirevision="batteries",
-            xaxis=theme.axis(
-                palette,
-                "Flight of this vehicle",
-                **theme.flight_ticks(len(self.flights)),
-            ),
-            yaxis=theme.axis(palette, "Voltage (V)"),
-        )
         columns = (
             Column("flight", "Flight of the vehicle", digits=0),
             Column("battery", "Battery"),
@@ -173,19 +140,19 @@ class BatteriesFigure:
             Column("after", "After", "V", 2),
         )
         rows = tuple((one.flight, one.battery or "no label", one.before_v, one.after_v) for one in self.flights)
-        return ready(
-            self,
-            [self._battery(palette, place, label) for place, label in enumerate(labels)],
-            layout,
+        return self.ready(
+            [self._battery(place, label) for place, label in enumerate(labels)],
             summary=self._summary(labels),
             table=Table(columns, rows),
+            xaxis=self.palette.axis("Flight of this vehicle", **theme.flight_ticks(len(self.flights))),
+            yaxis=self.palette.axis("Voltage (V)"),
         )
 
-    def _battery(self, palette: theme.Palette, place: int, label: str) -> Trace:
-        colour = palette.gains[place % len(palette.gains)]
+    def _battery(self, place: int, label: str) -> Trace:
+        colour = self.palette.gains[place % len(self.palette.gains)]
         own = [flight for flight in self.flights if flight.battery == label]
         symbols = (("circle-open", "circle"), ("square-open", "square"), ("diamond-open", "diamond"))
-        before, after = symbols[(place // len(palette.gains) + place) % len(symbols)]
+        before, after = symbols[(place // len(self.palette.gains) + place) % len(symbols)]
         return scatter(
             literal(label or "no label"),
             (

@@ -26,7 +26,9 @@ def analyze_upload(content: bytes, companion: bytes | None, *, name: str, gains:
 
     answer, plots = run_limited(FILE, analyze_content, content, companion, name, gains)
     figures = {
-        theme: {part: [card_of(PanelsFigure(plot, theme)) for plot in drawn] for part, drawn in plots.items()}
+        theme: {
+            part: [card_of(PanelsFigure(plot, theme_name=theme)) for plot in drawn] for part, drawn in plots.items()
+        }
         for theme in get_args(ThemeName)
     }
     return LogAnalysis(**dict(answer), figures=figures)

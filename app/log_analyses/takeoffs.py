@@ -10,6 +10,7 @@ from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
+from app.figures.data import Curve
 from app.figures.panels import Line, Panel, Plot, Style
 from app.figures.scale import thinned
 from app.log_analyses.schemas import (
@@ -71,7 +72,7 @@ def plot_of(analysis: TakeoffAnalysis) -> Plot:
 
     def line(name: str, style: Style, record: Trajectory, offset_m: float) -> Line:
         shown = (record.time_s >= 0.0) & (record.time_s <= analysis.window_s)
-        x, y = thinned(record.time_s[shown], record["altitude_m"][shown] - offset_m, _POINTS)
+        x, y = thinned(Curve(record.time_s[shown], record["altitude_m"][shown] - offset_m), _POINTS)
         return Line(name=name, style=style, x=tuple(x), y=tuple(y))
 
     def lines(offset_m: float) -> tuple[Line, ...]:

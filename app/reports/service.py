@@ -76,15 +76,15 @@ class Remark:
 class Report:
     """A campaign as the API returns it, with its settings described and its figures drawn for a light page.
 
-    `remarks` are in the order of the trials, with at most `photo_bytes` of photos in all; `what` was tuned and `how`;
-    `anomalies` are in the order of the flights; `made_at` is the time of creation, by program `version`.
+    `flown` are the trials that left the ground; `remarks` are in the order of the trials, with at most `photo_bytes` of
+    photos in all; `what` was tuned and `how`; `anomalies` are in the order of the flights; `made_at` is the time of
+    creation, by program `version`.
     """
 
     campaign: Campaign
     statistics: CampaignStatistics
-    trials: tuple[Trial, ...]
-    experiment: str
-    gains: tuple[Gain, ...]
+    flown: tuple[Trial, ...]
+    experiment: Experiment
     what: tuple[Fact, ...]
     how: tuple[Fact, ...]
     cards: tuple[Card, ...]
@@ -93,11 +93,6 @@ class Report:
     anomalies: tuple[Anomaly, ...]
     version: str
     made_at: datetime
-
-    @property
-    def flown(self) -> tuple[Trial, ...]:
-        """Trials that left the ground: those in the table of runs."""
-        return tuple(trial for trial in self.trials if trial.state in FLOWN)
 
 
 _STARTS: Final = {
@@ -298,12 +293,11 @@ def report_of(session: Session, campaign_id: int) -> Report:
     return Report(
         campaign=campaign,
         statistics=statistics,
-        trials=trials,
-        experiment=experiment.title,
-        gains=experiment.space.gains,
+        flown=tuple(trial for trial in trials if trial.state in FLOWN),
+        experiment=experiment,
         what=describe_vehicle(campaign, experiment, vehicle.identity, safe_gains),
         how=describe_method(campaign, experiment),
-        cards=tuple(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
+        cards=tuple(card_of(figure(past)) for figure in CAMPAIGN_FIGURES.values()),
         remarks=tuple(remarks_on(session, campaign_id, trials)),
         photo_bytes=MAX_PHOTO_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Final
 
 import numpy as np
@@ -28,7 +29,7 @@ from app.reproductions.f16_campaigns import (
     true_errors,
     truth,
 )
-from app.reproductions.results import Progress, Result, Row, curve, marks, ratio
+from app.reproductions.results import Progress, Result, Row, counted, curve, marks
 
 PERTURBATION: Final = 0.45
 SEEDS: Final = 50
@@ -118,15 +119,15 @@ def _optimum() -> Vector:
 def _showcase(shown: Showcase) -> Iterator[Row]:
     group = f"The paper's method on the model of seed {SHOWCASE_SEED}"
     errors, near = np.array(shown.errors), flights_to_optimum(shown.errors)
-    steps = -np.diff(errors)
+    steps, flown = -np.diff(errors), float(near or len(errors))
     yield Row(
         group=group,
         label="flights until near the optimum",
         unit="flights",
-        measured=float(near or len(errors)),
+        measured=flown,
         paper=float(PAPER_NEAR_OPTIMAL_AFTER),
         reference=PROTOTYPE_NEAR,
-        ratio=ratio(float(near or len(errors)), float(PAPER_NEAR_OPTIMAL_AFTER)),
+        ratio=flown / PAPER_NEAR_OPTIMAL_AFTER,
         digits=0,
         note=f"of {len(errors)} flown; the paper flew {PAPER_FLIGHTS}" if near else f"not within {len(errors)} flights",
     )
@@ -148,14 +149,12 @@ def _showcase(shown: Showcase) -> Iterator[Row]:
 
 
 def _starts(on_progress: Progress) -> Iterator[Row]:
-    share = (_FROM_STARTS - _FROM_SHOWCASE) / (len(EXPECTED_START) * SEEDS)
-    done = 0
+    tell = counted(on_progress, len(EXPECTED_START) * SEEDS, _FROM_SHOWCASE, _FROM_STARTS)
     for perturbation, expected in EXPECTED_START.items():
         errors = []
         for seed in range(SEEDS):
             errors.extend(true_errors([start(perturbation, seed).gains]))
-            done += 1
-            on_progress(_FROM_SHOWCASE + share * done, f"models' optima at ±{short_percent(perturbation)}, seed {seed}")
+            tell(f"models' optima at ±{short_percent(perturbation)}, seed {seed}")
         yield Row(
             group=f"The model's optimum flown on the true model, median of {SEEDS} models",
             label=f"error over the optimum's at ±{short_percent(perturbation)}",
@@ -177,16 +176,15 @@ class _Comparison:
 
 
 def _methods(comparisons: Sequence[_Comparison], seeds: Sequence[int], on_progress: Progress) -> Iterator[Row]:
-    total, before = len(seeds) * sum(len(each.methods) for each in comparisons), 0
+    total, flown = len(seeds) * sum(len(each.methods) for each in comparisons), count(1)
+    tell = counted(on_progress, total, _FROM_STARTS)
 
-    def tell(done: int, _of: int) -> None:
-        share = (before + done) / total
-        on_progress(_FROM_STARTS + (1.0 - _FROM_STARTS) * share, f"methods: {before + done} of {total} campaigns")
+    def on_campaign() -> None:
+        tell(f"methods: {next(flown)} of {total} campaigns")
 
     for each in comparisons:
-        found = study(each.perturbation, seeds, each.methods, tell, max_flights=each.max_flights)
-        before += len(seeds) * len(each.methods)
-        yield from (row for result in found for row in each.rows(result))
+        for result in study(each.perturbation, seeds, each.methods, on_campaign, max_flights=each.max_flights):
+            yield from each.rows(result)
 
 
 def _method(found: MethodResult) -> Iterator[Row]:
@@ -234,7 +232,7 @@ _FULL: Final = (
 
 
 def _figures(shown: Showcase) -> dict[str, Plot]:
-    best = next(flight for flight in shown.flights if flight.number == shown.best)
+    first, best = shown.flights[0], shown.best
     errors = np.array(shown.errors)
     return {
         "figure2-left": _search_plot(np.array(shown.search_errors)),
@@ -245,7 +243,7 @@ def _figures(shown: Showcase) -> dict[str, Plot]:
         "figure3-right": _errors_plot(errors),
         "figure4": _response_plot(
             "the first and the best flight",
-            (("Model's optimum", shown.flights[0].trajectory), (f"Flight {best.number}, best", best.trajectory)),
+            (("Model's optimum", first.trajectory), (f"Flight {best.number}, best", best.trajectory)),
         ),
     }
 

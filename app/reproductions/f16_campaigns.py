@@ -33,9 +33,6 @@ SHOWCASE_FLIGHTS: Final = 25
 PAPER_FLIGHTS: Final = 27
 PAPER_NEAR_OPTIMAL_AFTER: Final = 16
 
-Progress = Callable[[int, int], None]
-"""Called with the number of campaigns done and their total."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
@@ -127,7 +124,7 @@ class Showcase:
     `search_errors`: the model's lowest error so far at each iteration of the Nelder–Mead search for the start (figure
     2, left). `model_hand`, `model_start`: the model's run with the hand gains and with the start gains (figure 2,
     right). `flights`: gains, error and record of every flight of the true system (figures 3 and 4); `best` is the
-    number of the best.
+    one with the lowest error.
     """
 
     search_errors: tuple[float, ...]
@@ -136,8 +133,8 @@ class Showcase:
     flights: tuple[Flight, ...]
 
     @property
-    def best(self) -> int:
-        return min(self.flights, key=lambda flight: (flight.error, flight.number)).number
+    def best(self) -> Flight:
+        return min(self.flights, key=lambda flight: (flight.error, flight.number))
 
     @property
     def errors(self) -> Errors:
@@ -148,18 +145,19 @@ def study(
     perturbation: float,
     seeds: Sequence[int],
     methods: Sequence[str],
-    on_progress: Progress = lambda _done, _total: None,
+    on_campaign: Callable[[], object],
     *,
     max_flights: int = MAX_FLIGHTS,
 ) -> tuple[MethodResult, ...]:
     """Run every method on every inaccurate model.
 
-    Each campaign ends when it is within 5 % of the true optimum, has nothing to propose, or has flown `max_flights`.
+    Each campaign ends when it is within 5 % of the true optimum, has nothing to propose, or has flown `max_flights`;
+    then `on_campaign` is called.
     """
     found: dict[tuple[str, int], Errors] = {}
     for seed, method in product(seeds, methods):
         found[method, seed] = _campaign(METHODS[method], perturbation, seed, max_flights)
-        on_progress(len(found), len(seeds) * len(methods))
+        on_campaign()
     return tuple(
         MethodResult(
             method=METHODS[method],

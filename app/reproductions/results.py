@@ -1,7 +1,8 @@
 """Result of a reproduction: numbers compared with the published ones, and figures. Plain data, stored as JSON."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from itertools import count
 from typing import Final
 
 import numpy as np
@@ -9,11 +10,19 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from app.core.records.trajectory import Samples
+from app.figures.data import Curve
 from app.figures.panels import Line, Plot, Style
 from app.figures.scale import thinned
 
 Progress = Callable[[float, str], None]
 """Called with the share done, 0 … 1, and the current activity."""
+
+
+def counted(on_progress: Progress, total: int, first: float = 0.0, last: float = 1.0) -> Callable[[str], None]:
+    """To be called with each of `total` things done, which take the share from `first` to `last`."""
+    done = count(1)
+    return lambda doing: on_progress(first + (last - first) * next(done) / total, doing)
+
 
 OVERRULE: Final = "reproduces the paper's own flights in simulation"
 """Reason recorded for flying gains that the gate refuses; not possible on a real vehicle."""
@@ -52,25 +61,14 @@ class Result:
     figures: Mapping[str, Plot]
     notes: tuple[str, ...] = ()
 
-    def as_json(self) -> dict[str, object]:
-        return asdict(self)
 
-
-_RESULT: Final = TypeAdapter(Result)
-
-
-def result_from_json(document: object) -> Result:
-    """Restore a result from `as_json`. Raises ValueError for anything else."""
-    return _RESULT.validate_python(document)
-
-
-def ratio(measured: float, paper: float | None) -> float | None:
-    return None if not paper else measured / paper
+STORED: Final = TypeAdapter(Result)
+"""Restores a result from its `asdict` as JSON."""
 
 
 def curve(name: str, style: Style, x: Samples, y: Samples | NDArray[np.int64], *, note: str = "") -> Line:
     """A line through samples of shape (n,), thinned so that its shape and extremes are preserved."""
-    near, values = thinned(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), CURVE_POINTS)
+    near, values = thinned(Curve(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)), CURVE_POINTS)
     return Line(name=name, style=style, x=tuple(near), y=tuple(values), note=note)
 
 

@@ -1,10 +1,11 @@
 """Services for reproductions: request a run, read its result."""
 
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime
 from typing import Annotated, Final
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, ValidationError
 from sqlalchemy.orm import Session
 
 from app.common.errors import GainlineError, NotFoundError
@@ -18,7 +19,7 @@ from app.jobs import service as jobs
 from app.jobs.service import Job
 from app.reproductions.registry import REPRODUCTIONS
 from app.reproductions.registry import Reproduction as Entry
-from app.reproductions.results import Result, Row, result_from_json
+from app.reproductions.results import STORED, Result, Row
 
 
 class Run(Request):
@@ -71,21 +72,16 @@ ACTIVE_STATES: Final = (JobState.QUEUED, JobState.RUNNING)
 CAME_TO_NOTHING: Final = (JobState.FAILED, JobState.CANCELLED)
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
+class Order(Run):
     """Parameters of a reproduction job."""
 
     name: str
-    full: bool = False
-
-
-_ORDER: Final = TypeAdapter(Order)
 
 
 def read_order(order: object) -> Order:
     """Parse a job's order. Raises GainlineError for a job of another version of the program."""
     try:
-        found = _ORDER.validate_python(order)
+        found = Order.model_validate(order)
     except ValidationError as error:
         raise GainlineError(
             f"The job's request {order!r} cannot be read.", hint="Run the reproduction again."
@@ -102,14 +98,8 @@ def list_reproductions(session: Session) -> list[ReproductionSummary]:
 
 def get_reproduction(session: Session, name: str) -> Reproduction:
     """One reproduction with the rows of its newest result. Raises NotFoundError."""
-    each = _registered(name)
-    result = _result(session, name)
-    return Reproduction.view_of(
-        each,
-        **_summary(session, each),
-        rows=[] if result is None else list(result.rows),
-        notes=[] if result is None else list(result.notes),
-    )
+    each, result = _registered(name), _result(session, name)
+    return Reproduction.view_of(each, **_summary(session, each), rows=list(result.rows), notes=list(result.notes))
 
 
 def request_run(session: Session, name: str, *, full: bool) -> Job:
@@ -127,9 +117,9 @@ def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> C
     if figure_name not in each.figures:
         raise NotFoundError(f"figure {figure_name} of", name, hint=f"Available: {', '.join(each.figures)}.")
     title, result = each.figures[figure_name], _result(session, name)
-    if result is None or figure_name not in result.figures:
+    if figure_name not in result.figures:
         return Card(name=figure_name, title=title, state="waiting", reason="Run this reproduction to see its figures.")
-    card = card_of(PanelsFigure(result.figures[figure_name], theme))
+    card = card_of(PanelsFigure(result.figures[figure_name], theme_name=theme))
     return replace(card, name=figure_name, title=f"{title}: {card.title}")
 
 
@@ -169,12 +159,10 @@ def _latest_run(row: JobRow) -> LatestRun | None:
     )
 
 
-def _result(session: Session, name: str) -> Result | None:
-    """The newest result; None also if this version of the program cannot read it."""
+def _result(session: Session, name: str) -> Result:
+    """The newest result; an empty one without any, or if it is of another version of the program."""
     row = jobs.latest_result(session, REPRODUCTION_JOB, name)
-    if row is None:
-        return None
-    try:
-        return result_from_json(row.result)
-    except ValueError:
-        return None
+    if row is not None:
+        with suppress(ValidationError):
+            return STORED.validate_python(row.result)
+    return Result(rows=(), figures={})

@@ -23,7 +23,7 @@ from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.campaigns import CAMPAIGNS, Run, campaign_notes, fly_campaign, gains_text, runs_of, step_numbers
-from app.reproductions.results import OVERRULE, Progress, Result, Row, curve
+from app.reproductions.results import OVERRULE, Progress, Result, Row, counted, curve
 from app.vehicles.base import FlightOptions, OptionValue
 from app.vehicles.registry import get_kind, open_vehicle
 
@@ -135,17 +135,13 @@ def run_table(name: str, figure: str, on_progress: Progress, *, campaigns: Seque
     """Fly a table on both vehicles, and the campaigns on its own; `figure` is the name of the paper's figure."""
     table = TABLES[name]
     kinds = (table.vehicle, *(kind for kind in VEHICLES if kind != table.vehicle))
-    total = len(kinds) * len(table.flights) + len(campaigns)
-    flown: dict[str, list[Takeoff]] = {kind: [] for kind in kinds}
-    for kind in kinds:
-        for takeoff in _flown(table, kind):
-            flown[kind].append(takeoff)
-            on_progress(sum(map(len, flown.values())) / total, f"{kind}: {gains_text(takeoff.gains.values())} flown")
+    tell = counted(on_progress, len(kinds) * len(table.flights) + len(campaigns))
+    flown = {kind: list(_flown(table, kind, tell)) for kind in kinds}
     own, ended = flown[table.vehicle], []
     with _simulated(table.vehicle) as fly:
         for title in campaigns:
             ended.append(fly_campaign(title, table.series[CAMPAIGNS[title].start.kind], fly))
-            on_progress(1.0 - (len(campaigns) - len(ended)) / total, f"{table.vehicle}: campaign {title} flown")
+            tell(f"{table.vehicle}: campaign {title} flown")
     return Result(
         rows=(
             *(row for kind in kinds for row in _rows(table, kind, flown[kind])),
@@ -241,13 +237,14 @@ def _until(name: str, style: Style, flight: Trajectory, values: Samples, last_s:
     return curve(name, style, flight.time_s[shown], values[shown], note=note)
 
 
-def _flown(table: Table, kind: str) -> Iterator[Takeoff]:
+def _flown(table: Table, kind: str, tell: Callable[[str], None]) -> Iterator[Takeoff]:
     experiment = get_experiment("takeoff")
     with _simulated(kind) as fly:
         for published in table.flights:
             wanted = dict(zip(experiment.space.names, map(float, published.gains), strict=True))
             overruled = overruled_for(wanted, kind)
             flight = fly(wanted)
+            tell(f"{kind}: {gains_text(wanted.values())} flown")
             yield Takeoff(
                 published=published,
                 gains=wanted,

@@ -2,7 +2,7 @@
 
 import threading
 from concurrent.futures import CancelledError
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from time import monotonic
 from typing import Final
 
@@ -50,7 +50,7 @@ class ReproductionJob:
             _log.info("reproduction cancelled", name=order.name)
             return
         with self.database.write() as session:
-            jobs.finish_job(session, job.id, worker=self.worker, result=result.as_json())
+            jobs.finish_job(session, job.id, worker=self.worker, result=asdict(result))
         _log.info("reproduction stored", name=order.name, seconds=round(monotonic() - started_s, 1))
 
     def _watch(self, job: ClaimedJob, process: ChildProcess) -> Result | None:

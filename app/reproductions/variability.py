@@ -17,7 +17,7 @@ from app.core.formatting import number, short_percent
 from app.core.policy import Vector
 from app.core.statistics.comparisons import Group, pool_scatter, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
-from app.reproductions.results import OVERRULE, Progress, Result, Row, marks, ratio
+from app.reproductions.results import OVERRULE, Progress, Result, Row, counted, marks
 from app.reproductions.tables import overruled_for
 from app.vehicles.registry import check_options
 from app.vehicles.simulated import simulate_flight, trajectory_of
@@ -62,15 +62,8 @@ class Repeats:
 
 def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_groups: int = FADING_GROUPS) -> Result:
     """Fly both policies on `groups` batteries of ten flights each; `groups` and `fading_groups` ≥ 1."""
-    per_policy = groups + fading_groups
-    found: list[Repeats] = []
-    for place, policy in enumerate(POLICIES):
-
-        def tell(done: int, place: int = place, policy: RepeatedPolicy = policy) -> None:
-            share = (place * per_policy + done) / (len(POLICIES) * per_policy)
-            on_progress(share, f"{policy.title}: battery {done} of {per_policy} flown")
-
-        found.append(_fly(policy, groups, fading_groups, tell))
+    tell = counted(on_progress, len(POLICIES) * (groups + fading_groups))
+    found = [_fly(policy, groups, fading_groups, tell) for policy in POLICIES]
     return Result(
         rows=tuple(row for policy, flown in zip(POLICIES, found, strict=True) for row in _rows(policy, flown)),
         figures={"figure12": _plot([flown.steady[0] for flown in found])},
@@ -116,13 +109,13 @@ def _named(gains: tuple[int, int, int]) -> dict[str, float]:
     return dict(zip(get_experiment("takeoff").space.names, map(float, gains), strict=True))
 
 
-def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable[[int], None]) -> Repeats:
+def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable[[str], None]) -> Repeats:
     overruled = overruled_for(_named(policy.gains), "twin")
     flown: list[Vector] = []
     for group in range(groups + fading_groups):
         fade = FADE if group >= groups else 0.0
         flown.append(repeated_errors(policy.gains, seed=SEED, group=group, fade=fade))
-        tell(len(flown))
+        tell(f"{policy.title}: battery {len(flown)} of {groups + fading_groups} flown")
     return Repeats(np.array(flown[:groups]), np.array(flown[groups:]), overruled)
 
 
@@ -147,7 +140,7 @@ def _rows(policy: RepeatedPolicy, flown: Repeats) -> Iterator[Row]:
         unit="m",
         measured=mean,
         paper=policy.paper_error,
-        ratio=ratio(mean, policy.paper_error),
+        ratio=mean / policy.paper_error,
         note="published: the one flight of Table 2",
         gains=_named(policy.gains),
         overruled=flown.overruled,
@@ -181,7 +174,7 @@ def _sigma_row(policy: RepeatedPolicy, flown: Repeats) -> Row:
         unit="m",
         measured=sigma,
         paper=policy.paper_sigma,
-        ratio=ratio(sigma, policy.paper_sigma),
+        ratio=sigma / policy.paper_sigma,
         note=f"a single battery shows {low:.4f} … {high:.4f} m (5th to 95th of 100)",
         gains=_named(policy.gains),
         overruled=flown.overruled,

@@ -8,6 +8,7 @@ worker of a running server finds nothing to do; browsers are told of it as of an
 import io
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from itertools import count
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -180,7 +181,7 @@ class States:
 
     def reproduce(self, name: str) -> None:
         """A reproduction that was run."""
-        result = get_reproduction(name).run(lambda _share, _doing: None, False).as_json()
+        result = asdict(get_reproduction(name).run(lambda _share, _doing: None, False))
 
         def store(session: Session) -> None:
             reproductions.request_run(session, name, full=False)

@@ -1,24 +1,20 @@
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
 
 import pytest
 
 from app.figures import CAMPAIGN_FIGURES
-from app.figures.base import Card, card_of
+from app.figures.base import Card, Figure, card_of
 from app.figures.data import Noise, Range, Repeats
 from app.figures.theme import PALETTES, Palette, ThemeName
 from tests.figures.builders import flight, history, proposal
 
 
 @dataclass(frozen=True)
-class Broken:
-    name: ClassVar[str] = "broken"
-    title: ClassVar[str] = "Broken figure"
-
-    def not_ready(self) -> str | None:
-        return None
+class Broken(Figure):
+    name = "broken"
+    title = "Broken figure"
 
     def compute(self) -> Card:
         raise ZeroDivisionError("no flights to divide by")
@@ -34,8 +30,8 @@ def test_a_figure_that_breaks_becomes_an_error_card_and_a_logged_error(caplog: p
 
 @pytest.mark.parametrize("name", CAMPAIGN_FIGURES)
 def test_every_registered_figure_gives_a_card_for_an_empty_and_for_a_flown_campaign(name: str) -> None:
-    empty = card_of(CAMPAIGN_FIGURES[name](history(), "light"))
-    flown = card_of(CAMPAIGN_FIGURES[name](history(flight(1, 0.3), flight(2, None, outcome="lost")), "dark"))
+    empty = card_of(CAMPAIGN_FIGURES[name](history(), theme_name="light"))
+    flown = card_of(CAMPAIGN_FIGURES[name](history(flight(1, 0.3), flight(2, None, outcome="lost")), theme_name="dark"))
     assert empty.state in {"ready", "waiting"}
     assert (flown.name, flown.state) == (name, "ready")
     assert flown.table is not None
@@ -90,7 +86,7 @@ def test_every_colour_that_a_figure_draws_with_can_be_seen_and_every_text_read(
         proposal=proposal(flights + 2, interval=Range(0.1, 0.2), band_m=0.1),
         noise=noise,
     )
-    card = card_of(CAMPAIGN_FIGURES[name](past, theme))
+    card = card_of(CAMPAIGN_FIGURES[name](past, theme_name=theme))
     surface = PALETTES[theme].surface
     found = list(drawn_colours(card.figure))
     assert found

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.figures.base import card_of
 from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure, pen
-from app.figures.data import Curve
+from app.figures.data import NO_CURVE, Curve
 from app.figures.theme import PALETTES
 from tests.figures.builders import SET_POINT, TIME_S, climb, layout, trace, traces
 
@@ -19,10 +19,11 @@ def compared(*curves: Curve | None, first: str = "flight 0") -> ComparisonData:
         set_point=SET_POINT,
         flights=tuple(
             ComparedCurve(
+                index=index,
                 trial_id=10 + index,
                 label="ABCDE"[index],
                 name=f"flight {index}" if index else first,
-                curve=curve,
+                curve=curve or NO_CURVE,
                 error=0.1,
             )
             for index, curve in enumerate(curves)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.core.records.flight_events import FlightEvent
-from app.figures.data import Curve, Range
+from app.figures.data import NO_CURVE, Curve, Range
 from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from tests.figures.builders import REFERENCE, SET_POINT, TIME_S, climb, layout, trace, traces
 
@@ -119,8 +119,8 @@ def test_throttle_is_marked_where_it_is_saturated_but_not_at_rest_before_it_star
 
 
 def test_a_flight_without_a_record_is_shown_as_such() -> None:
-    assert FlightFigure(replace(RECORD, curve=None)).not_ready() == "There is no record of this flight yet."
-    lost = replace(RECORD, curve=None, is_over=True)
+    assert FlightFigure(replace(RECORD, curve=NO_CURVE)).not_ready() == "There is no record of this flight yet."
+    lost = replace(RECORD, curve=NO_CURVE, is_over=True)
     assert FlightFigure(lost).not_ready() == "No record of this flight was received."
 
 

@@ -19,7 +19,7 @@ LOWER = Panel(y_title="Thrust", lines=(MODEL,), digits=1)
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_every_line_is_drawn_in_its_panel_and_named_once(theme: ThemeName) -> None:
-    card = card_of(PanelsFigure(plot(UPPER, LOWER), theme))
+    card = card_of(PanelsFigure(plot(UPPER, LOWER), theme_name=theme))
     assert (card.state, card.title, card.summary) == ("ready", "Two runs", "They differ.")
     assert card.figure is not None
     traces = card.figure["data"]

@@ -304,7 +304,7 @@ def test_many_flights_share_the_points_so_that_the_figure_stays_small() -> None:
 
 
 def test_thinning_keeps_the_extremes_of_a_curve() -> None:
-    x, y = thinned(TIME_S, climb(0.3).values, 100)
+    x, y = thinned(climb(0.3), 100)
     assert len(x) <= 100
     assert max(y) == pytest.approx(climb(0.3).values.max(), abs=1e-4)
     assert (x[0], x[-1]) == (0.0, 32.6)
@@ -327,7 +327,9 @@ def test_the_robust_range_leaves_out_outliers_only(peaks: list[float], outside: 
 
 
 def test_both_themes_draw_the_same_values_in_different_colours() -> None:
-    light, dark = (TrajectoriesFigure(history(flight(1, 0.3)), theme).compute() for theme in ("light", "dark"))
+    light, dark = (
+        TrajectoriesFigure(history(flight(1, 0.3)), theme_name=theme).compute() for theme in ("light", "dark")
+    )
     assert trace(light, "flight", trial=1)["y"] == trace(dark, "flight", trial=1)["y"]
     assert trace(light, "flight", trial=1)["line"]["color"] != trace(dark, "flight", trial=1)["line"]["color"]
 

@@ -1,6 +1,7 @@
 """Reproductions over HTTP: listed, asked for once, and their newest result with its figures."""
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import httpx2
@@ -34,7 +35,7 @@ def claim(database: Database) -> int:
 
 def finish(database: Database, job_id: int) -> None:
     """With the controller's own result."""
-    result = json.loads(json.dumps(run_controller(lambda _share, _doing: None).as_json()))
+    result = json.loads(json.dumps(asdict(run_controller(lambda _share, _doing: None))))
     with database.write() as session:
         assert jobs.finish_job(session, job_id, worker=WORKER, result=result)
 

@@ -73,7 +73,7 @@ def test_every_figure_draws_what_was_flown(shown: Showcase) -> None:
     before, after, off = plots["figure4"].panels
     assert [each.name for each in before.lines] == ["Model's optimum", "Reference"]
     assert max(before.lines[1].y) == pytest.approx(10.0, abs=0.05), "the reference swings by 10°"
-    assert after.lines[0].name == f"Flight {shown.best}, best"
+    assert after.lines[0].name == f"Flight {shown.best.number}, best"
     first, best = (max(map(abs, line.y[len(line.y) // 2 :])) for line in off.lines)
     assert best < first, "in the second half of the minute"
 

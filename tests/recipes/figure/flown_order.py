@@ -1,21 +1,16 @@
 """The number of each flight over its order: an example of a figure."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
-from app.figures import theme
-from app.figures.base import Card, Column, Table, ready, scatter
-from app.figures.data import History
+from app.figures.base import CampaignFigure, Card, Column, Table, scatter
 
 
 @dataclass(frozen=True, slots=True)
-class FlownOrderFigure:
+class FlownOrderFigure(CampaignFigure):
     """Table columns: `flight`, and its `place` from 1."""
 
-    history: History
-    theme_name: theme.ThemeName = "light"
-    name: ClassVar[str] = "order"
-    title: ClassVar[str] = "Order of the flights"
+    name = "order"
+    title = "Order of the flights"
 
     def not_ready(self) -> str | None:
         return None if self.history.flights else "The order appears after the first flight."
@@ -25,5 +20,4 @@ class FlownOrderFigure:
         places = list(range(1, len(numbers) + 1))
         table = Table((Column("flight", "Flight"), Column("place", "Place")), tuple(zip(numbers, places, strict=True)))
         traces = [scatter("flights", (places, numbers), role="flown")]
-        layout = theme.layout(theme.PALETTES[self.theme_name])
-        return ready(self, traces, layout, summary=f"{len(numbers)} flights.", table=table)
+        return self.ready(traces, summary=f"{len(numbers)} flights.", table=table)
