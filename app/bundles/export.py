@@ -17,6 +17,7 @@ from app.bundles.contents import (
     FORMAT,
     MANIFEST,
     MAX_CAMPAIGNS,
+    VERSION,
     Campaign,
     Contents,
     Manifest,
@@ -26,7 +27,6 @@ from app.bundles.contents import (
     Trial,
     Vehicle,
 )
-from app.bundles.earlier_versions import VERSION
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
