@@ -4,7 +4,7 @@ For a worker: `read_proposed`, then `plan` and `app.core.tuning.landscape` (pure
 of `as_json`. Only the newest landscape of a campaign is kept.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -34,16 +34,11 @@ LANDSCAPE_JOB: Final = "landscape"
 _STORED: Final = TypeAdapter(Landscape)
 
 
-@dataclass(frozen=True, slots=True)
-class LandscapeAnswer:
-    """The card, and whether a job still has to be requested for its content."""
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> tuple[Card, bool]:
+    """The landscape of the latest proposal, or why there is none; and whether a job still has to be requested for it.
 
-    card: Card
-    wanted: bool = False
-
-
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> LandscapeAnswer:
-    """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
+    Raises NotFoundError for an unknown campaign.
+    """
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     definition = definition_of(campaign)
@@ -56,9 +51,9 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> Land
     job = _job(session, proposal)
     if job is None or job.result is None:
         return _not_yet(session, campaign, proposal, job)
-    found, drawn = _STORED.validate_python(job.result["landscape"]), history_of(session, campaign_id, curves=False)
+    found, drawn = _STORED.validate_python(job.result["landscape"]), history_of(session, campaign_id)
     tried = [step["gains"] for step in proposal.explanation.get("ladder", ())]
-    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, tried, theme)))
+    return card_of(LandscapeFigure(drawn, found, tried, theme)), False
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
@@ -104,7 +99,7 @@ def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
     return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
 
 
-def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow, job: JobRow | None) -> LandscapeAnswer:
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow, job: JobRow | None) -> tuple[Card, bool]:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed. Their landscape follows.")
     wanted = _is_wanted(job)
@@ -121,9 +116,9 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow, job
     return _waiting(reason, wanted=wanted)
 
 
-def _waiting(reason: str, *, wanted: bool = False) -> LandscapeAnswer:
+def _waiting(reason: str, *, wanted: bool = False) -> tuple[Card, bool]:
     title = "Error landscape of the model"
-    return LandscapeAnswer(Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted)
+    return Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted
 
 
 def _job(session: Session, proposal: ProposalRow) -> JobRow | None:
