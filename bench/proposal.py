@@ -12,6 +12,7 @@ with 1 if one takes more than a second, or more in proportion on a slower machin
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -19,7 +20,7 @@ from app.campaigns import service as campaigns
 from app.campaigns.computation import warm_up
 from app.campaigns.proposals import PROPOSAL_JOB
 from app.campaigns.schemas import Definition, NewCampaign, StopRule
-from app.campaigns.tasks import ProposalJob
+from app.campaigns.tasks import compute_proposal
 from app.campaigns.trials.schemas import FlightOrder, TrialPlan
 from app.campaigns.trials.service import create_trial
 from app.db.migrate import migrate
@@ -95,9 +96,8 @@ def main() -> int:
         database = Database(file)
         cold = time.perf_counter()
         with ComputePool(1, prepare=warm_up) as pool:
-            runner = JobRunner(
-                database, PROPOSAL_JOB, ProposalJob(database, pool, worker=WORKER), room=1, worker=WORKER, lease_s=30.0
-            )
+            propose_next = partial(compute_proposal, database, pool, worker=WORKER)
+            runner = JobRunner(database, PROPOSAL_JOB, propose_next, room=1, worker=WORKER, lease_s=30.0)
             first = one_campaign(database, runner, {"stop": StopRule(kind="budget", max_flights=1)})
             print(
                 f"cold, the start of the process included: {time.perf_counter() - cold:.2f} s ({first[0]:.2f} s first)"

@@ -1,18 +1,19 @@
-"""Schema of a bundle, with the validation of its contents; `app.bundles.earlier_versions` tells what earlier ones lack.
+"""Schema of a bundle, with the validation of its contents, and what the contents of earlier versions lack.
 
 A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
 campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
 in the database (`app.db.trajectories`), with its own checksum.
 """
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field, TypeAdapter, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.bundles.earlier_versions import VERSION
 from app.campaigns.schemas import Definition
 from app.campaigns.trials.schemas import TrialFacts
 from app.common.schemas import Gate, Name, OptionValue, Schema
@@ -25,8 +26,11 @@ from app.core.tuning.stop_rules import StopVerdict
 from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 from app.db.base import JsonObject
+from app.db.earlier_ends import give_end
+from app.vehicles.registry import IMPORT
 
 FORMAT: Final = "gainline-campaign"
+VERSION: Final = 6
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
@@ -55,11 +59,11 @@ def _fits(kind: Any) -> AfterValidator:
     return AfterValidator(check)
 
 
-def _spread_of(given: JsonObject) -> JsonObject:
-    spread = {name: value for name, value in given.items() if name != "flights"}
-    _adapter(ParameterDistribution).validate_python(spread)
-    _adapter(list[int] | None).validate_python(given.get("flights"))
-    return given
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Spread(ParameterDistribution):
+    """A parameter distribution with the numbers of the flights that it was fitted to."""
+
+    flights: list[int] | None = None
 
 
 class _Strict(Schema):
@@ -152,7 +156,7 @@ class Proposal(_Strict):
     stop_verdict: Annotated[JsonObject, _fits(StopVerdict)]
     interval: Annotated[JsonObject, _fits(Interval)] | None
     advice: Annotated[JsonObject, _fits(Advice)] | None
-    spread: Annotated[JsonObject, AfterValidator(_spread_of)] | None
+    spread: Annotated[JsonObject, _fits(_Spread)] | None
     computed_at: AwareDatetime
 
 
@@ -211,3 +215,33 @@ class Contents(_Strict):
     """The campaign comes last, after those that it starts from, the first of them first."""
 
     campaigns: Annotated[list[Campaign], Field(min_length=1, max_length=MAX_CAMPAIGNS)]
+
+
+_IN_CAMPAIGNS: Final[Mapping[int, Mapping[str, object]]] = {3: {"open_until_flight": 0}}
+_IN_TRIALS: Final[Mapping[int, Mapping[str, object]]] = {
+    2: {"abort_cause": None},
+    4: {"rise_time_s": None, "settling_time_s": None, "steady_state_error_m": None},
+    5: {"predicted": None},
+    6: {"end": None},  # earlier ones have only its words, as the reason
+}
+"""By the version that brought them, the fields, and what they are in a bundle of before."""
+
+
+def bring_up_to_date(contents: Any, version: int) -> None:
+    """Complete the contents of a bundle of that version, so that the schema knows the present one only. Whatever is
+    malformed stays, to be refused afterwards."""
+    if version == VERSION:
+        return
+    of_campaign, of_trial = _lacking(_IN_CAMPAIGNS, version), _lacking(_IN_TRIALS, version)
+    with suppress(AttributeError, KeyError, TypeError):
+        for campaign in contents["campaigns"]:
+            campaign.update(of_campaign | campaign)
+            has_flown = campaign["vehicle"]["kind"] != IMPORT.name
+            for trial in campaign["trials"]:
+                trial.update(of_trial | trial)
+                if "end" in of_trial:
+                    give_end(trial, was_flown=has_flown and trial["ending"] is not None)
+
+
+def _lacking(brought: Mapping[int, Mapping[str, object]], version: int) -> dict[str, object]:
+    return {name: value for since, fields in brought.items() if since > version for name, value in fields.items()}

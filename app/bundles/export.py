@@ -17,6 +17,7 @@ from app.bundles.contents import (
     FORMAT,
     MANIFEST,
     MAX_CAMPAIGNS,
+    VERSION,
     Campaign,
     Contents,
     Manifest,
@@ -26,7 +27,6 @@ from app.bundles.contents import (
     Trial,
     Vehicle,
 )
-from app.bundles.earlier_versions import VERSION
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
@@ -149,11 +149,10 @@ class Packer:
 
 def _vehicle(row: VehicleRow) -> Vehicle:
     """The vehicle's description; for a placeholder, that of the vehicle it stands for."""
-    described = Vehicle.model_validate(row)
     if (origin := origin_of(row)) is None:
-        return described
+        return Vehicle.view_of(row)
     kind, name = origin
-    return described.model_copy(update={"kind": kind, "name": name, "registered": True})
+    return Vehicle.view_of(row, kind=kind, name=name, registered=True)
 
 
 def _damaged_curve(whose: str, campaign: CampaignRow) -> StorageError:

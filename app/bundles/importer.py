@@ -1,6 +1,7 @@
 """Import of a checked bundle: stores it as rows with new ids; every number and time is unchanged."""
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Final
 
@@ -51,16 +52,14 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
 def _definition(where: str, source: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
     """The definition with the new id of the campaign that it starts from."""
     donor = (source.get("start") or {}).get("donor")
-    if donor is not None and donor["campaign_id"] not in new_ids:
-        raise refusal(
-            Problem(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle"),
-            hint=_OTHER_VERSION,
-        )
     if donor is not None:
-        source = {
-            **source,
-            "start": {**source["start"], "donor": {**donor, "campaign_id": new_ids[donor["campaign_id"]]}},
-        }
+        if donor["campaign_id"] not in new_ids:
+            raise refusal(
+                Problem(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle"),
+                hint=_OTHER_VERSION,
+            )
+        source = deepcopy(source)
+        source["start"]["donor"]["campaign_id"] = new_ids[donor["campaign_id"]]
     if wrong := problems_of(core_definition(Definition.model_validate(source)), EXPERIMENTS):
         raise refusal(Problem(f"{where}.definition.{wrong[0].field}", wrong[0].reason), hint=_OTHER_VERSION)
     return source

@@ -17,8 +17,7 @@ import zstandard
 from pydantic import BaseModel, ValidationError
 
 from app.autopilots.registry import EXPERIMENTS
-from app.bundles.contents import CONTENTS, MANIFEST, Campaign, Contents, Manifest, Record
-from app.bundles.earlier_versions import VERSION, bring_up_to_date
+from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Record, bring_up_to_date
 from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem

@@ -273,18 +273,18 @@ def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[SettingPat
 def _known(file: CampaignFile) -> dict[str, SettingPath]:
     """Path of each setting, by its name on the command line."""
     strategy, experiment = STRATEGIES.get(file.definition.strategy), EXPERIMENTS.get(file.definition.experiment)
+    described = (
+        (("vehicle", "options"), get_kind(file.vehicle.kind).options),
+        (("definition", "experiment_options"), experiment.options if experiment else ()),
+        (("definition", "options"), strategy.options if strategy else ()),
+    )
     return {
         "first_step_fraction": ("definition", "first_step_fraction"),
         "step_fraction": ("definition", "step_fraction"),
         "stop": ("definition", "stop", "kind"),
         "confidence": ("definition", "stop", "confidence"),
         "improvement": ("definition", "stop", "improvement"),
-        **{option.name: ("vehicle", "options", option.name) for option in get_kind(file.vehicle.kind).options},
-        **{
-            option.name: ("definition", "experiment_options", option.name)
-            for option in (experiment.options if experiment else ())
-        },
-        **{option.name: ("definition", "options", option.name) for option in (strategy.options if strategy else ())},
+        **{option.name: (*path, option.name) for path, options in described for option in options},
     }
 
 

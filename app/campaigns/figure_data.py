@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.proposals import is_stale
-from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
 from app.core.definition import Interval
 from app.core.experiments.base import Experiment, ModelledExperiment
@@ -82,41 +81,27 @@ class FigureView:
     predicted: int | None = None
 
 
-WHOLE_FLIGHT: Final = FigureView()
-
-_Predicted = tuple[Curve, Band | None]
-"""A predicted curve and its band."""
-
-
 def campaign_figure(
     session: Session,
     campaign_id: int,
     name: Literal["takeoffs", "errors", "gains"],
     theme: ThemeName,
-    view: FigureView = WHOLE_FLIGHT,
+    view: FigureView,
 ) -> Card:
     """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
-    past = (
-        history_of(session, campaign_id, curves=True, view=view)
-        if name == "takeoffs"
-        else history_of(session, campaign_id, curves=False)
-    )
+    past = history_of(session, campaign_id, view if name == "takeoffs" else None)
     return card_of(CAMPAIGN_FIGURES[name](past, theme_name=theme))
 
 
 def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
     """The figure of one flight. Raises NotFoundError for an unknown trial."""
-    campaign_id = trials_service.get_trial(session, trial_id).campaign_id
-    trials = history.trials_of(session, campaign_id)
-    row = next(row for row in trials if row.id == trial_id)
-    return card_of(FlightFigure(_flight_record(session, row, trials), theme_name=theme))
+    return card_of(FlightFigure(_flight_record(session, history.trial_row(session, trial_id)), theme_name=theme))
 
 
-def history_of(session: Session, campaign_id: int, *, curves: bool, view: FigureView = WHOLE_FLIGHT) -> History:
-    """Input data of the campaign's figures.
+def history_of(session: Session, campaign_id: int, view: FigureView | None = None) -> History:
+    """Input data of the campaign's figures, with the curves of a `view`; without one no record is read.
 
-    Without `curves` no record is read. With them, full records are read only for the flights that are drawn
-    individually; the others have their coarse curves.
+    Full records are read only for the flights that are drawn individually; the others have their coarse curves.
     """
     campaign = repository.get_campaign(session, campaign_id)
     rows = history.trials_of(session, campaign_id)
@@ -124,6 +109,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     definition, experiment = evidence.definition, evidence.experiment
     flown = [row for row in rows if row.state in history.FLOWN]
     set_point, reference = _goal(experiment)
+    shown = view or FigureView()
     bare = History(
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
@@ -133,17 +119,17 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         reference=reference,
         by_reference=experiment.target_channel is not None,
         flights=tuple(_flight(row, corrected=history.is_corrected(rows, row.number)) for row in flown),
-        proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted),
+        proposal=_predicted_flight(session, campaign, rows, experiment.output, shown.predicted),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(evidence),
         curves_title=experiment.curves_title,
-        window=view.window,
-        chosen=view.chosen,
+        window=shown.window,
+        chosen=shown.chosen,
         altitude_limit_m=get_kind(campaign.vehicle.kind).altitude_limit_m
         if experiment.output == "altitude_m"
         else None,
     )
-    if not curves:
+    if view is None:
         return bare
     drawn = _curves(session, flown, select_individual_flights(bare), experiment.output)
     return replace(
@@ -264,7 +250,7 @@ def _curve_id(row: TrialRow) -> int | None:
     return row.proposal.predicted_id if row.proposal.gains == row.gains else None
 
 
-def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:
+def _predicted(session: Session, curve_id: int | None, output: str) -> tuple[Curve, Band | None]:
     """A stored predicted curve and its band, where there are any."""
     predicted = None if curve_id is None else trajectories.readable_of(session, [curve_id]).get(curve_id)
     if predicted is None:
@@ -275,9 +261,9 @@ def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicte
     return _curve(predicted, output), band
 
 
-def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
-    campaign = repository.get_campaign(session, row.campaign_id)
-    experiment = experiment_of_campaign(campaign)
+def _flight_record(session: Session, row: TrialRow) -> FlightRecordData:
+    trials = history.trials_of(session, row.campaign_id)
+    experiment = experiment_of_campaign(row.campaign)
     set_points = experiment.set_points
     set_point, modelled = _goal(experiment)
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)

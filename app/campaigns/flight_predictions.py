@@ -3,7 +3,8 @@
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from threading import Lock
 from typing import Final
 
@@ -11,7 +12,6 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
 from app.campaigns.definitions import flown_evidence
-from app.campaigns.proposals import read_donor
 from app.campaigns.schemas import GainsPrediction, PredictedCurve
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
@@ -67,56 +67,54 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     NotFoundError, and GainsError when they are not the campaign's gains or no controller can hold them.
     """
     with database.read() as session:
-        read = _read(session, cache, campaign_id, asked)
-    return _view(read.question, _predict(cache, read))
-
-
-@dataclass(frozen=True, slots=True)
-class DatedPrediction:
-    """A prediction to be stored with a trial, None if there is none; its gains, and the digest of the history that it
-    is made of."""
-
-    digest: str
-    gains: Gains
-    prediction: Proposal | None
-
-
-def predict_ahead(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> DatedPrediction:
-    """The same before a transaction that plans a trial with these gains. Raises as `predict_gains` does."""
-    read = _read(session, cache, campaign_id, asked)
-    question = read.question
-    return DatedPrediction(question.digest, question.gains, _stored(question, _predict(cache, read)))
-
-
-def predict_planned(
-    session: Session, campaign: CampaignRow, gains: Gains, ahead: DatedPrediction | None
-) -> Proposal | None:
-    """The prediction of a trial within the transaction that plans it, which is short: that made ahead if the history
-    is still the same, else that of a repeat, else none."""
-    question = _question(session, campaign, gains)
-    if ahead is not None and (ahead.digest, ahead.gains) == (question.digest, question.gains):
-        return ahead.prediction
-    if not question.flown:
-        return None
-    flights = history.flights_of(session, campaign.id, recorded=question.flown)
-    repeat = predict_repeat(replace(question.evidence, flights=flights), question.gains)
-    return _stored(question, _checked(question, repeat))
+        question = _read(session, cache, campaign_id, asked)
+    return _view(question, _predict(cache, question))
 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """A complete gain set in a campaign's history, whose `evidence` lacks the records; `flown` are the numbers of the
-    valid flights with these gains."""
+    """A complete gain set in a campaign's history; `flown` are the numbers of the valid flights with these gains.
+
+    `evidence` has the records that a prediction needs once these are read; `kept` is the model if it is fitted already.
+    """
 
     evidence: Evidence[Experiment]
     trials: Sequence[TrialRow]
     gains: Gains
     digest: str
     flown: Collection[int]
+    kept: FittedModel | None = None
 
     @property
     def output(self) -> str:
         return self.evidence.experiment.output
+
+
+@dataclass(slots=True)
+class TrialPredictor:
+    """Predicts the trial of one request as the dashboard shows it, with as much of its curve as is stored."""
+
+    cache: PredictorCache
+    _ahead: _Question | None = field(default=None, init=False)
+    _prediction: Proposal | None = field(default=None, init=False)
+
+    def prepare(self, session: Session, campaign_id: int, asked: Gains) -> None:
+        """Predict before the transaction that plans a trial with these gains. Raises as `predict_gains` does."""
+        question = _read(session, self.cache, campaign_id, asked)
+        self._prediction = _stored(question, _predict(self.cache, question))
+        self._ahead = question
+
+    def predict(self, session: Session, campaign: CampaignRow, gains: Gains) -> Proposal | None:
+        """The prediction within that transaction, which is short: that made ahead if the history is still the same,
+        else that of a repeat, else none."""
+        question, ahead = _question(session, campaign, gains), self._ahead
+        if ahead is not None and (ahead.digest, ahead.gains) == (question.digest, question.gains):
+            return self._prediction
+        if not question.flown:
+            return None
+        flights = history.flights_of(session, campaign.id, recorded=question.flown)
+        repeat = predict_repeat(replace(question.evidence, flights=flights), question.gains)
+        return _stored(question, _checked(question, repeat))
 
 
 def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Question:
@@ -128,30 +126,22 @@ def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Questio
     return _Question(evidence, trials, gains, digest, flown)
 
 
-@dataclass(frozen=True, slots=True)
-class _Read:
-    """All that a prediction needs of the database; `kept` is the model if it is fitted already."""
-
-    question: _Question
-    evidence: Evidence[Experiment]
-    kept: FittedModel | None
-
-
-def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> _Read:
+def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> _Question:
+    """The question with all that a prediction needs of the database."""
     question = _question(session, repository.get_campaign(session, campaign_id), asked)
     kept = cache.find(question.digest)
     is_new = not question.flown and kept is None
     recorded = modelled_flights(question.evidence) if is_new else question.flown
     flights = history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else ()
-    donor = read_donor(session, question.evidence.definition) if is_new else None
-    return _Read(question, replace(question.evidence, flights=flights, donor=donor), kept)
+    donor = history.donor_of(session, question.evidence.definition) if is_new else None
+    return replace(question, evidence=replace(question.evidence, flights=flights, donor=donor), kept=kept)
 
 
-def _predict(cache: PredictorCache, read: _Read) -> Proposal | None:
-    question, kept = read.question, read.kept
-    predicted = predict_repeat(read.evidence, question.gains)
+def _predict(cache: PredictorCache, question: _Question) -> Proposal | None:
+    evidence, kept = question.evidence, question.kept
+    predicted = predict_repeat(evidence, question.gains)
     if predicted is None:
-        fitted = cache.get(question.digest, lambda: flight_predictor(read.evidence) if kept is None else kept.predictor)
+        fitted = cache.get(question.digest, lambda: flight_predictor(evidence) if kept is None else kept.predictor)
         predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
     return _checked(question, predicted)
 
@@ -178,12 +168,12 @@ def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
 
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
     curve = None if predicted is None else predicted.predicted
-    lower, upper = (_edge(curve, channel) for channel in band_channels(question.output))
+    lower, upper = (_curve(curve, channel, thin_by_bends) for channel in band_channels(question.output))
     return GainsPrediction(
         gains=dict(question.gains),
         predicted_error=None if predicted is None else predicted.predicted_error,
         interval=None if predicted is None else predicted.interval,
-        curve=_curve(curve, question.output),
+        curve=_curve(curve, question.output, partial(thinned, points=CURVE_POINTS)),
         lower=lower,
         upper=upper,
     )
@@ -194,15 +184,10 @@ def _only(trajectory: Trajectory, *names: str) -> Trajectory:
     return replace(trajectory, channels={name: trajectory[name] for name in names if name in trajectory.channels})
 
 
-def _curve(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
-    if trajectory is None:
-        return None
-    time_s, values = thinned(Curve(trajectory.time_s, trajectory[channel]), CURVE_POINTS)
-    return PredictedCurve(time_s=time_s, values=values)
-
-
-def _edge(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
+def _curve(
+    trajectory: Trajectory | None, channel: str, thin: Callable[[Curve], tuple[list[float], list[float]]]
+) -> PredictedCurve | None:
     if trajectory is None or channel not in trajectory.channels:
         return None
-    time_s, values = thin_by_bends(Curve(trajectory.time_s, trajectory[channel]))
+    time_s, values = thin(Curve(trajectory.time_s, trajectory[channel]))
     return PredictedCurve(time_s=time_s, values=values)

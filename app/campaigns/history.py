@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session, defer
 from app.autopilots.registry import experiment_of
 from app.campaigns import repository
 from app.common.conflict_checks import check_transition
-from app.common.errors import NotFoundError, StorageError
+from app.common.errors import ConflictError, NotFoundError, StorageError
 from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     CAMPAIGN_TRANSITIONS,
@@ -29,8 +29,8 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
-from app.core.definition import Definition, Donor, Flight, Interval, Prediction
-from app.core.experiments.base import Experiment, ModelledExperiment
+from app.core.definition import Definition, Flight, Interval, Prediction
+from app.core.experiments.base import ModelledExperiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
 from app.db import trajectories
@@ -87,17 +87,24 @@ def flights_of(session: Session, campaign_id: int, *, recorded: Collection[int] 
     )
 
 
-def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight | None:
-    """The flight that a warm start uses; None when its record does not match the checksum.
+def donor_of(session: Session, definition: Definition) -> Flight | None:
+    """The flight that a warm start uses, None without one. Raises ConflictError when it has been deleted or changed.
 
     Valid and scored from its record, whatever its present class, because the computed start may depend on the record
     alone.
     """
+    donor = definition.start.donor
+    if donor is None:
+        return None
     rows = [row for row in trials_of(session, donor.campaign_id) if row.number == donor.trial_number]
     if not rows or rows[0].trajectory is None or rows[0].trajectory.checksum != donor.checksum:
-        return None
+        raise ConflictError(
+            f"The flight that this campaign starts from, {donor.trial_number} of campaign {donor.campaign_id}, has "
+            "been deleted or changed.",
+            hint="Choose another start, or select the campaign as the donor again.",
+        )
     record = trajectory_of(session, rows[0].trajectory.id)
-    error = experiment.error(record, accept_gaps=True)
+    error = experiment_of(definition).error(record, accept_gaps=True)
     as_flown = _flight(rows[0], record, _numbers(rows[0].settings))
     return replace(as_flown, error=error, outcome="valid", predicted=None, against_gains=True)
 

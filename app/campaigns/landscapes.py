@@ -1,11 +1,10 @@
 """The model's error around a campaign's gains, computed as a job for one proposal and stored as that job's result.
 
-For a worker: `read_plan`, then `app.core.tuning.landscape` (pure, in any process), then store the result of `as_json`.
-Only the newest landscape of a campaign is kept.
+For a worker: `read_proposed`, then `plan` and `app.core.tuning.landscape` (pure, in any process), then store the result
+of `as_json`. Only the newest landscape of a campaign is kept.
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -35,16 +34,11 @@ LANDSCAPE_JOB: Final = "landscape"
 _STORED: Final = TypeAdapter(Landscape)
 
 
-@dataclass(frozen=True, slots=True)
-class LandscapeAnswer:
-    """The card, and whether a job still has to be requested for its content."""
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> tuple[Card, bool]:
+    """The landscape of the latest proposal, or why there is none; and whether a job still has to be requested for it.
 
-    card: Card
-    wanted: bool = False
-
-
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> LandscapeAnswer:
-    """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
+    Raises NotFoundError for an unknown campaign.
+    """
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     definition = definition_of(campaign)
@@ -54,37 +48,28 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> Land
         return _waiting("The campaign's bounds leave fewer than two gains free; a landscape needs two.")
     if proposal is None:
         return _waiting("The landscape appears here once the first gains are proposed.")
-    found = _result(session, campaign_id, proposal.id)
-    if found is None:
-        return _not_yet(session, campaign, proposal)
-    drawn = history_of(session, campaign_id, curves=False)
+    job = _job(session, proposal)
+    if job is None or job.result is None:
+        return _not_yet(session, campaign, proposal, job)
+    found, drawn = _STORED.validate_python(job.result["landscape"]), history_of(session, campaign_id)
     tried = [step["gains"] for step in proposal.explanation.get("ladder", ())]
-    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, tried, theme_name=theme)))
+    return card_of(LandscapeFigure(drawn, found, tried, theme_name=theme)), False
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
     """Request a job that computes the landscape of the latest proposal, unless there is one or a person cancelled
     it."""
     proposal = repository.latest_proposal(session, campaign_id)
-    if proposal is None or not _is_wanted(_job(session, campaign_id, proposal.id)):
+    if proposal is None or not _is_wanted(_job(session, proposal)):
         return
-    order: JsonObject = {"name": _name(campaign_id), "proposal_id": proposal.id}
+    order: JsonObject = {"name": f"campaign {campaign_id}", "proposal_id": proposal.id}
     job = jobs.enqueue_job(session, LANDSCAPE_JOB, campaign_id=campaign_id, order=order)
     job.order = order  # a job that still waits may be for an outdated proposal
 
 
-@dataclass(frozen=True, slots=True)
-class LandscapePlan:
-    """What to compute, of which campaign: the gains through which the slices go, and those they must contain."""
-
-    past: CampaignHistory
-    centre: Gains
-    marks: Sequence[Gains]
-
-
-def read_plan(session: Session, campaign_id: int, order: JsonObject) -> LandscapePlan:
-    """Read what the job's proposal was computed from. Raises SupersededError when the campaign's flights have changed
-    since."""
+def read_proposed(session: Session, campaign_id: int, order: JsonObject) -> tuple[CampaignHistory, ProposalRow]:
+    """Read the job's proposal and what it was computed from. Raises SupersededError when the campaign's flights have
+    changed since."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
     proposal = session.get(ProposalRow, named) if isinstance(named, int) else None
@@ -95,16 +80,18 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
             "The campaign's flights have changed since these gains were proposed.",
             hint="No action is needed: the landscape of the next proposal replaces it.",
         )
-    return LandscapePlan(
-        past,
-        centre=_grid_centre(past, proposal),
-        marks=(*(flight.gains for flight in past.flights), proposal.gains),
-    )
+    return past, proposal
 
 
-def plan(order: LandscapePlan) -> LandscapeGrid | None:
-    """Return the model and the grid, for a compute process; None without a model, or with fewer than two free gains."""
-    return plan_grid(order.past.evidence, order.centre, order.marks)
+def plan(past: CampaignHistory, proposed: Gains, base_flight: int | None) -> LandscapeGrid | None:
+    """Return the model and the grid, for a compute process; None without a model, or with fewer than two free gains.
+
+    Its slices contain the gains of all flights and the proposed ones, and go through those of the flight from which
+    the proposal starts, else through the proposed ones.
+    """
+    flown = {flight.number: flight.gains for flight in past.flights}
+    centre = proposed if base_flight is None else flown.get(base_flight, proposed)
+    return plan_grid(past.evidence, centre, [*flown.values(), proposed])
 
 
 def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
@@ -112,10 +99,9 @@ def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
     return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
 
 
-def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> LandscapeAnswer:
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow, job: JobRow | None) -> tuple[Card, bool]:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed. Their landscape follows.")
-    job = _job(session, campaign.id, proposal.id)
     wanted = _is_wanted(job)
     if job is not None and not wanted and job.state in {JobState.FAILED, JobState.CANCELLED}:
         problem = jobs.job_problem(job)
@@ -130,35 +116,17 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     return _waiting(reason, wanted=wanted)
 
 
-def _waiting(reason: str, *, wanted: bool = False) -> LandscapeAnswer:
+def _waiting(reason: str, *, wanted: bool = False) -> tuple[Card, bool]:
     title = "Error landscape of the model"
-    return LandscapeAnswer(Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted)
+    return Card(name=LandscapeFigure.name, title=title, state="waiting", reason=reason), wanted
 
 
-def _name(campaign_id: int) -> str:
-    return f"campaign {campaign_id}"
-
-
-def _job(session: Session, campaign_id: int, proposal_id: int) -> JobRow | None:
-    """The newest landscape job, if it is for that proposal."""
-    job = jobs.latest_ordered(session, LANDSCAPE_JOB, _name(campaign_id), tuple(JobState))
-    return job if job is not None and (job.order or {}).get("proposal_id") == proposal_id else None
+def _job(session: Session, proposal: ProposalRow) -> JobRow | None:
+    """The campaign's newest landscape job, if it is for that proposal."""
+    job = jobs.latest_job(session, proposal.campaign_id, LANDSCAPE_JOB)
+    return job if job is not None and (job.order or {}).get("proposal_id") == proposal.id else None
 
 
 def _is_wanted(job: JobRow | None) -> bool:
     """Whether a job has to be requested, given the newest one."""
     return job is None or jobs.is_withdrawn(job)
-
-
-def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape | None:
-    job = jobs.latest_result(session, LANDSCAPE_JOB, _name(campaign_id))
-    if job is None or job.result is None or job.result["proposal_id"] != proposal_id:
-        return None
-    return _STORED.validate_python(job.result["landscape"])
-
-
-def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, float]:
-    """Gains of the flight that the proposal starts from, else the proposal's own."""
-    number = proposal.explanation.get("base_flight")
-    base = next((flight for flight in past.flights if flight.number == number), None)
-    return dict(proposal.gains if base is None else base.gains)

@@ -10,9 +10,9 @@ from dataclasses import asdict
 from typing import Final
 
 import numpy as np
+from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of, flown_evidence, frozen_digest
@@ -20,7 +20,6 @@ from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set
 from app.campaigns.schemas import ChoiceKind, Variant
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
-from app.core.definition import Definition, Flight
 from app.core.experiments.base import Check, Experiment, ParameterDistribution, prior_distribution
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult
@@ -31,6 +30,7 @@ from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.jobs import service as jobs
 
 PROPOSAL_JOB: Final = "proposal"
+_DISTRIBUTION: Final = TypeAdapter(ParameterDistribution)
 _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "aborted again": Outcome.STOPPED,
     "flight budget": Outcome.BUDGET,
@@ -49,25 +49,10 @@ def read_history(session: Session, campaign_id: int) -> CampaignHistory:
         definition=definition,
         flights=history.flights_of(session, campaign_id),
         digest=history.history_digest(session, row, definition, trials),
-        donor=read_donor(session, definition),
+        donor=history.donor_of(session, definition),
         battery_v=history.last_battery_v(trials),
         open_until_flight=row.open_until_flight,
     )
-
-
-def read_donor(session: Session, definition: Definition) -> Flight | None:
-    """The flight that a warm start uses, None without one. Raises ConflictError when it has been deleted or changed."""
-    named = definition.start.donor
-    if named is None:
-        return None
-    found = history.donor_of(session, experiment_of(definition), named)
-    if found is None:
-        raise ConflictError(
-            f"The flight that this campaign starts from, {named.trial_number} of campaign {named.campaign_id}, has "
-            "been deleted or changed.",
-            hint="Choose another start, or select the campaign as the donor again.",
-        )
-    return found
 
 
 def store_proposal(session: Session, campaign_id: int, computed: ProposalComputation) -> ProposalRow:
@@ -195,11 +180,7 @@ def stored_distribution(session: Session, campaign: CampaignRow, experiment: Exp
     valid = {row.number for row in history.trials_of(session, campaign.id) if row.state == TrialState.VALID}
     if not valid.issuperset(shown_by):
         return prior_distribution(experiment)
-    return ParameterDistribution(
-        mean=tuple(latest.spread["mean"]),
-        covariance=tuple(tuple(row) for row in latest.spread["covariance"]),
-        origin=latest.spread["origin"],
-    )
+    return _DISTRIBUTION.validate_python(latest.spread)
 
 
 def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reason: str) -> None:

@@ -1,7 +1,6 @@
 """Rehearsals: whether a campaign on a real vehicle was first flown on a simulation with the same definition."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -20,16 +19,7 @@ FLIGHTS: Final = 3
 _FAILED_STATES: Final = frozenset({TrialState.ABORTED, TrialState.INVALID, TrialState.LOST})
 
 
-@dataclass(frozen=True, slots=True)
-class RehearsalTrial:
-    """One trial of a rehearsal; `gate_passed` is false where the gate's refusal was overruled."""
-
-    number: int
-    state: TrialState
-    gate_passed: bool
-
-
-def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) -> tuple[RehearsalState, str]:
+def rehearsal_result(trials: Sequence[repository.GatedTrial], outcome: Outcome | None) -> tuple[RehearsalState, str]:
     """State of a rehearsal by its flights, and the reason. `outcome` is None until its campaign is finished.
 
     Passed: at least FLIGHTS valid flights, or as many as the campaign's own rule took to end it; none of them aborted,
@@ -65,9 +55,7 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     flown = (row for row in held if not row.vehicle.is_real and definition_of(row).digest() == wanted)
     row = next(flown, None)
     if row is not None:
-        state, reason = rehearsal_result(
-            [RehearsalTrial(*trial) for trial in repository.gated(session, row.id)], row.outcome
-        )
+        state, reason = rehearsal_result(repository.gated(session, row.id), row.outcome)
         return Rehearsal(state=state, campaign_id=row.id, reason=reason)
     if campaign.definition_digest is not None:
         return Rehearsal(state="not needed", campaign_id=None, reason="it flew before rehearsals were required")

@@ -1,7 +1,7 @@
 """Queries on campaigns, proposals, trials and flights."""
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 from sqlalchemy import ColumnElement, Select, String, delete, func, or_, select, union_all
 from sqlalchemy.orm import Session, defer, joinedload
@@ -43,11 +43,19 @@ def settings(session: Session, trial_ids: Collection[int]) -> Mapping[int, Optio
     return dict(session.execute(wanted).all())
 
 
-def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
-    """Number, state, and whether the gate passed the gains, of each trial; by number."""
+class GatedTrial(NamedTuple):
+    """Number and state of a trial; `gate_passed` is false where the gate's refusal of its gains was overruled."""
+
+    number: int
+    state: TrialState
+    gate_passed: bool
+
+
+def gated(session: Session, campaign_id: int) -> Sequence[GatedTrial]:
+    """The trials of a campaign by number."""
     wanted = select(TrialRow.number, TrialRow.state, TrialRow.gate["passed"].as_boolean())
     found = session.execute(wanted.where(TrialRow.campaign_id == campaign_id).order_by(TrialRow.number))
-    return [(number, state, bool(passed)) for number, state, passed in found]
+    return [GatedTrial(number, state, bool(passed)) for number, state, passed in found]
 
 
 def curves(session: Session, trial_ids: Collection[int]) -> Mapping[int, list[list[float]]]:

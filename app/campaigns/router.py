@@ -172,11 +172,11 @@ def get_landscape(
     done the card is `waiting`.
     """
     with database.read() as session:
-        asked = landscapes.landscape_card(session, campaign_id, theme)
-    if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
+        card, is_wanted = landscapes.landscape_card(session, campaign_id, theme)
+    if is_wanted and is_allowed(Permission.CHANGE, asking.caller):
         with database.write() as session:
             landscapes.request_landscape(session, campaign_id)
-    return asked.card
+    return card
 
 
 @figures_router.get("/campaigns/{campaign_id}/figures/{name}")

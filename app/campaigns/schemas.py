@@ -224,14 +224,24 @@ class Winner(Schema):
 Standing = Literal["candidate", "confirmed", "not confirmed"]
 
 
-class Campaign(Schema):
-    """One vehicle, one experiment, one strategy, and the results."""
+class CampaignBrief(Schema):
+    """What the list of campaigns and a campaign's own page both tell."""
 
     id: int
-    version: int
     name: str
     state: CampaignState
     outcome: Outcome | None
+    vehicle: CampaignVehicle
+    best: BestTrial | None
+    verdict: Annotated[Verdict | None, Field(description=VERDICT)]
+    next_action: str
+    updated_at: datetime
+
+
+class Campaign(CampaignBrief):
+    """One vehicle, one experiment, one strategy, and the results."""
+
+    version: int
     stop_reason: str
     definition: Definition
     definition_digest: Annotated[
@@ -240,12 +250,9 @@ class Campaign(Schema):
     open_until_flight: Annotated[
         int, Field(description="number of flights up to which no stop rule ends it, because it was reopened")
     ]
-    vehicle: CampaignVehicle
     parent_id: int | None
     rehearsal: Rehearsal
     rehearses: Annotated[int | None, Field(description="the campaign that this one rehearses")]
-    best: BestTrial | None
-    verdict: Annotated[Verdict | None, Field(description=VERDICT)]
     winner: Winner | None
     standing: Annotated[
         Standing | None,
@@ -256,10 +263,8 @@ class Campaign(Schema):
     ]
     trials: TrialCounts
     flying: FlyingTrial | None
-    next_action: str
     actions: Annotated[list[str], Field(description="allowed actions: plan, define, finish, archive, …")]
     created_at: datetime
-    updated_at: datetime
 
 
 class SparkCurve(Schema):
@@ -271,26 +276,17 @@ class SparkCurve(Schema):
     values: list[float]
 
 
-class CampaignSummary(Schema):
+class CampaignSummary(CampaignBrief):
     """A campaign as one card of the list. `best` is of the gains with the best mean, `first_error` the mean with the
     first gains; `spark` holds the first flight, the best and the latest, at most 7."""
 
-    id: int
-    name: str
-    state: CampaignState
-    outcome: Outcome | None
-    vehicle: CampaignVehicle
     experiment: str
     strategy: str
     flights: int
-    best: BestTrial | None
     first_error: float | None
-    verdict: Annotated[Verdict | None, Field(description=VERDICT)]
     rehearsal: RehearsalState
     has_passed_as_rehearsal: Annotated[bool, Field(description="whether it is a rehearsal that lets its campaign fly")]
-    next_action: str
     spark: list[SparkCurve]
-    updated_at: datetime
 
 
 class GainChange(Schema):

@@ -35,12 +35,11 @@ from app.campaigns.schemas import (
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
-from app.common.schemas import LONGEST_NAME, OptionValue, Page
+from app.common.schemas import LONGEST_NAME, Page
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
-from app.core.definition import Definition as CoreDefinition
 from app.core.formatting import confidence_text, format_gains, named_flights
 from app.db.base import added
-from app.db.models import CampaignRow, RehearsalRow, VehicleRow
+from app.db.models import CampaignRow, RehearsalRow
 from app.db.pages import page_of
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -107,14 +106,6 @@ def create_campaign(session: Session, new: NewCampaign) -> Campaign:
     return campaign_view(session, add_campaign(session, new.name, new.definition, new.vehicle))
 
 
-def create_ready_campaign(session: Session, new: NewCampaign) -> int:
-    """Create a campaign whose first flights have been flown already: it takes them without a proposal. Returns its id.
-    Raises InputError that names every invalid field."""
-    row = add_campaign(session, new.name, new.definition, new.vehicle)
-    set_campaign_state(row, CampaignState.READY)
-    return row.id
-
-
 def add_campaign(
     session: Session,
     name: str,
@@ -130,18 +121,8 @@ def add_campaign(
     `safe_gains` are given for a rehearsal: those of the vehicle that it is for. Every other campaign gets its own
     vehicle's at its first flight. Raises InputError that names what cannot be used.
     """
-    definition, options, vehicle = _checked(session, asked, choice, continues)
-    row = CampaignRow(
-        name=name,
-        state=CampaignState.DRAFT,
-        experiment=definition.experiment,
-        strategy=definition.strategy,
-        definition=stored(definition),
-        vehicle=vehicle,
-        vehicle_options=options,
-        parent_id=parent_id,
-        safe_gains=safe_gains,
-    )
+    row = CampaignRow(name=name, state=CampaignState.DRAFT, parent_id=parent_id, safe_gains=safe_gains)
+    _set_definition(session, row, asked, choice, continues)
     added(session, row)
     request_proposal(session, row)
     return row
@@ -287,14 +268,15 @@ def _choice_of(row: CampaignRow) -> VehicleChoice:
     return VehicleChoice(kind=vehicle.kind, options=row.vehicle_options)
 
 
-def _checked(
-    session: Session, asked: Definition, choice: VehicleChoice, continues: str
-) -> tuple[CoreDefinition, dict[str, OptionValue], VehicleRow]:
-    """The checked definition, the campaign's own vehicle options (none for a registered vehicle), and the vehicle."""
+def _set_definition(
+    session: Session, row: CampaignRow, asked: Definition, choice: VehicleChoice, continues: str
+) -> None:
+    """Check what the campaign flies, on which vehicle, and set both."""
     definition, options = check_campaign(fill_in_donor(session, asked), choice, continues=continues)
     space = get_experiment(definition.experiment).space
-    vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
-    return definition, options, vehicle
+    row.vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
+    row.experiment, row.strategy = definition.experiment, definition.strategy
+    row.definition, row.vehicle_options = stored(definition), options
 
 
 def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
@@ -302,9 +284,7 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     _require_no_flight(session, row)
     vehicle = edit.vehicle or _choice_of(row)
     asked = edit.definition or _definition_for(row, vehicle)
-    definition, options, row.vehicle = _checked(session, asked, vehicle, row.experiment)
-    row.experiment, row.strategy = definition.experiment, definition.strategy
-    row.definition, row.vehicle_options = stored(definition), options
+    _set_definition(session, row, asked, vehicle, row.experiment)
     if row.vehicle.is_real:  # it gets the safe gains of its own vehicle; a rehearsal had those of another
         row.safe_gains = None
     cancel_unflown(history.trials_of(session, row.id), None, "the campaign's definition was changed")

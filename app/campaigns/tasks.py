@@ -1,6 +1,5 @@
 """Execution of a campaign's jobs: read flights, compute in the pool, store a proposal or a landscape."""
 
-from dataclasses import KW_ONLY, dataclass
 from time import monotonic
 from typing import Final
 
@@ -21,69 +20,46 @@ PROGRESS_EVERY_S: Final = 2.0
 _log = structlog.get_logger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class ProposalJob:
-    """Carries out proposal jobs for a job runner."""
+def compute_proposal(database: Database, pool: ComputePool, job: ClaimedJob, *, worker: str) -> None:
+    """Compute a proposal from the stored flights and store it, as a job's work.
 
-    database: Database
-    pool: ComputePool
-    _: KW_ONLY
-    worker: str
-
-    def __call__(self, job: ClaimedJob) -> None:
-        """Compute a proposal from the stored flights and store it.
-
-        Raises GainlineError, and CancelledError when the pool is closed meanwhile.
-        """
-        if job.campaign_id is None:
-            raise GainlineError("The job names no campaign.", hint="")
-        started_s = monotonic()
-        with self.database.read() as session:
-            past = proposals.read_history(session, job.campaign_id)
-        computed = self.pool.run(computation.compute, past)
-        with self.database.write() as session:
-            if jobs.finish_job(session, job.id, worker=self.worker):
-                proposals.store_proposal(session, job.campaign_id, computed)
-        _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
+    Raises GainlineError, and CancelledError when the pool is closed meanwhile.
+    """
+    assert job.campaign_id is not None
+    started_s = monotonic()
+    with database.read() as session:
+        past = proposals.read_history(session, job.campaign_id)
+    computed = pool.run(computation.compute, past)
+    with database.write() as session:
+        if jobs.finish_job(session, job.id, worker=worker):
+            proposals.store_proposal(session, job.campaign_id, computed)
+    _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
 
 
-@dataclass(frozen=True, slots=True)
-class LandscapeJob:
-    """Carries out landscape jobs for a job runner."""
+def compute_landscape(database: Database, pool: ComputePool, job: ClaimedJob, *, worker: str, lease_s: float) -> None:
+    """Compute the landscape of the stored proposal in batches and store it, as a job's work.
 
-    database: Database
-    pool: ComputePool
-    _: KW_ONLY
-    worker: str
-    lease_s: float
-
-    def __call__(self, job: ClaimedJob) -> None:
-        """Compute the landscape of the stored proposal in batches and store it.
-
-        Raises GainlineError, and CancelledError when the pool is closed meanwhile.
-        """
-        if job.campaign_id is None:
-            raise GainlineError("The job names no campaign.", hint="")
-        started_s = monotonic()
-        with self.database.read() as session:
-            plan = landscapes.read_plan(session, job.campaign_id, job.order)
-        survey = self.pool.run(landscapes.plan, plan)
-        if survey is None:
-            raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
-        points = survey.points()
-        parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
-        errors, done, told_s = [], 0, started_s
-        for part in parts:
-            if monotonic() - told_s >= PROGRESS_EVERY_S:
-                told_s = monotonic()
-                self._report(job, done / len(points), f"{done} of {len(points)} gain sets evaluated")
-            errors.append(self.pool.run(survey.predict_errors, part))
-            done += len(part)
-        result = landscapes.as_json(survey.landscape(np.concatenate(errors)), job.order)
-        with self.database.write() as session:
-            jobs.finish_job(session, job.id, worker=self.worker, result=result)
-        _log.info("landscape stored", points=len(points), seconds=round(monotonic() - started_s, 3))
-
-    def _report(self, job: ClaimedJob, share: float, doing: str) -> None:
-        with self.database.write() as session:
-            jobs.report_progress(session, job.id, share, doing, worker=self.worker, lease_s=self.lease_s)
+    Raises GainlineError, and CancelledError when the pool is closed meanwhile.
+    """
+    assert job.campaign_id is not None
+    started_s = monotonic()
+    with database.read() as session:
+        past, proposal = landscapes.read_proposed(session, job.campaign_id, job.order)
+    survey = pool.run(landscapes.plan, past, proposal.gains, proposal.explanation.get("base_flight"))
+    if survey is None:
+        raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
+    points = survey.points()
+    parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
+    errors, done, told_s = [], 0, started_s
+    for part in parts:
+        if monotonic() - told_s >= PROGRESS_EVERY_S:
+            told_s = monotonic()
+            share, doing = done / len(points), f"{done} of {len(points)} gain sets evaluated"
+            with database.write() as session:
+                jobs.report_progress(session, job.id, share, doing, worker=worker, lease_s=lease_s)
+        errors.append(pool.run(survey.predict_errors, part))
+        done += len(part)
+    result = landscapes.as_json(survey.landscape(np.concatenate(errors)), job.order)
+    with database.write() as session:
+        jobs.finish_job(session, job.id, worker=worker, result=result)
+    _log.info("landscape stored", points=len(points), seconds=round(monotonic() - started_s, 3))

@@ -90,10 +90,17 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
     by_campaign: Mapping[int, list[TrialRow]] = defaultdict(list)
     for trial in history.trials_of(session, *(row.id for row in rows)):
         by_campaign[trial.campaign_id].append(trial)
-    sparks = _sparks(session, by_campaign)
+    sparking = {row.id: _sparking(by_campaign[row.id]) for row in rows}
+    curves = repository.curves(session, [trial.id for trials in sparking.values() for trial in trials])
     passed = passed_rehearsals(session, [row.id for row in rows])
     return [
-        _summary(row, by_campaign[row.id], rehearsal_of(session, row), sparks[row.id], has_passed=row.id in passed)
+        _summary(
+            row,
+            by_campaign[row.id],
+            rehearsal_of(session, row),
+            _spark(sparking[row.id], curves),
+            has_passed=row.id in passed,
+        )
         for row in rows
     ]
 
@@ -253,28 +260,22 @@ def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> li
     return allowed(CAMPAIGN_ACTIONS, row.state, ruled_out)
 
 
-def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> Mapping[int, list[SparkCurve]]:
-    """Curves of the first flight, the best and the latest of each campaign, in their order; none for a campaign without
-    any."""
-    chosen = {campaign: _sparking(trials) for campaign, trials in by_campaign.items()}
-    curves = repository.curves(session, [trial.id for trials in chosen.values() for trial in trials])
-    found: Mapping[int, list[SparkCurve]] = defaultdict(list)
-    for campaign, trials in chosen.items():
-        best = history.best_of(trials)
-        found[campaign].extend(
-            SparkCurve(
-                trial_number=trial.number,
-                best=trial is best,
-                time_s=[time_s for time_s, _ in curves[trial.id]],
-                values=[value for _, value in curves[trial.id]],
-            )
-            for trial in trials
-            if trial.id in curves
+def _spark(trials: Sequence[TrialRow], curves: Mapping[int, list[list[float]]]) -> list[SparkCurve]:
+    best = history.best_of(trials)
+    return [
+        SparkCurve(
+            trial_number=trial.number,
+            best=trial is best,
+            time_s=[time_s for time_s, _ in curves[trial.id]],
+            values=[value for _, value in curves[trial.id]],
         )
-    return found
+        for trial in trials
+        if trial.id in curves
+    ]
 
 
 def _sparking(trials: Sequence[TrialRow]) -> list[TrialRow]:
+    """The first flight, the best and the latest, in their order."""
     recorded = [trial for trial in trials if trial.trajectory_id is not None]
     flown = [trial for trial in recorded if trial.state in {TrialState.VALID, TrialState.CAPTURED}]
     best = history.best_of(flown)

@@ -14,7 +14,6 @@ from sqlalchemy.orm import Session
 
 from app.autopilots.registry import experiment_of
 from app.campaigns import history
-from app.campaigns import service as campaigns_service
 from app.campaigns.definitions import definition_of
 from app.campaigns.trials.schemas import GroupBrief
 from app.common.errors import InputError, Problem
@@ -59,7 +58,6 @@ class ComparisonFlight(Side):
     """One flight of a comparison; `label` is its letter in the figure."""
 
     row: TrialRow
-    campaign: CampaignRow
     experiment: Experiment
     label: str
 
@@ -85,9 +83,9 @@ def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightCompari
                 trial_id=side.row.id,
                 label=side.label,
                 name=side.name,
-                campaign_name=side.campaign.name,
-                vehicle=vehicle_name(side.campaign),
-                is_real=side.campaign.vehicle.is_real,
+                campaign_name=side.row.campaign.name,
+                vehicle=vehicle_name(side.row.campaign),
+                is_real=side.row.campaign.vehicle.is_real,
                 experiment=side.experiment.title,
                 group=None
                 if side.group is None
@@ -129,7 +127,7 @@ def export_curves(session: Session, trial_ids: Sequence[int]) -> tuple[str, str]
     unit = data.output_unit
     columns = {"time_s": [f"{second:.2f}" for second in grid], f"set_point_{unit}": _column(data.set_point, grid)}
     for side, flight in zip(sides, data.flights, strict=True):
-        title = f"campaign_{side.campaign.id}_flight_{side.row.number}_{side.experiment.output}"
+        title = f"campaign_{side.campaign_id}_flight_{side.row.number}_{side.experiment.output}"
         columns[title] = _column(flight.curve, grid)
     lines = [",".join(columns), *(",".join(cells) for cells in zip(*columns.values(), strict=True))]
     return f"{file_stem([side.row for side in sides])}.csv", "\n".join(lines) + "\n"
@@ -170,9 +168,9 @@ def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonDat
     )
 
 
-def names_of(rows: Sequence[TrialRow], campaigns: Mapping[int, CampaignRow]) -> list[str]:
+def names_of(rows: Sequence[TrialRow]) -> list[str]:
     """`flight 3`; with the campaign's name if there are several, and with its id if two have the same name."""
-    used = {row.campaign_id: campaigns[row.campaign_id].name for row in rows}
+    used = {row.campaign_id: row.campaign.name for row in rows}
     if len(used) == 1:
         return [f"flight {row.number}" for row in rows]
     alike = Counter(used.values())
@@ -202,7 +200,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
     Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared.
     """
     found = {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
-    campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
+    campaigns = {row.campaign_id: row.campaign for row in found.values()}
     experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
     problems = [
         Problem(f"trial.{index}", reason)
@@ -221,7 +219,6 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
     return [
         ComparisonFlight(
             row=row,
-            campaign=campaigns[row.campaign_id],
             experiment=experiment,
             label=label,
             number=row.number,
@@ -236,7 +233,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
             ),
             population=population,
         )
-        for row, label, name in zip(rows, LABELS, names_of(rows, campaigns), strict=False)
+        for row, label, name in zip(rows, LABELS, names_of(rows), strict=False)
         for experiment, population in [(experiments[row.campaign_id], populations[row.campaign_id])]
     ]
 
@@ -271,18 +268,18 @@ def _refusal(
         return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
     first = next(found[other] for other in trial_ids if other in found)
     own, wanted = experiments[row.campaign_id], experiments[first.campaign_id]
-    if own.error_unit != wanted.error_unit:
-        differ = f"is in {own.error_unit}", f"in {wanted.error_unit}"
-    elif own.measure != wanted.measure:
-        differ = f"is of {own.measure}", f"of {wanted.measure}"
-    elif own.window_s != wanted.window_s:
-        differ = f"covers a window of {own.window_s:g} s", f"one of {wanted.window_s:g} s"
-    else:
-        return None
-    return (
-        f"the error of flight {row.number} of campaign {row.campaign_id} {differ[0]}, that of flight {first.number} "
-        f"of campaign {first.campaign_id} {differ[1]}: the errors are different quantities"
+    alike = (
+        (f"is in {own.error_unit}", f"in {wanted.error_unit}", own.error_unit == wanted.error_unit),
+        (f"is of {own.measure}", f"of {wanted.measure}", own.measure == wanted.measure),
+        (f"covers a window of {own.window_s:g} s", f"one of {wanted.window_s:g} s", own.window_s == wanted.window_s),
     )
+    reasons = (
+        f"the error of flight {row.number} of campaign {row.campaign_id} {this}, that of flight {first.number} "
+        f"of campaign {first.campaign_id} {that}: the errors are different quantities"
+        for this, that, is_alike in alike
+        if not is_alike
+    )
+    return next(reasons, None)
 
 
 def vehicle_name(campaign: CampaignRow) -> str:
@@ -293,7 +290,7 @@ def vehicle_name(campaign: CampaignRow) -> str:
 
 def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
     """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
-    row, campaign = side.row, side.campaign
+    row, campaign = side.row, side.row.campaign
     kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
     strategy = STRATEGIES[campaign.strategy]
     options = fleet.options_of(campaign)

@@ -111,15 +111,6 @@ def _damaged() -> StorageError:
     )
 
 
-def recorded(session: Session, campaign_id: int | None = None) -> Sequence[TrialRow]:
-    """Trials of one campaign, or of all, that have a record; by campaign and number."""
-    wanted = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
-    if campaign_id is not None:
-        wanted = wanted.where(TrialRow.campaign_id == campaign_id)
-    lean = wanted.options(defer(TrialRow.gate), defer(TrialRow.curve), defer(TrialRow.settings))
-    return session.scalars(lean.order_by(TrialRow.campaign_id, TrialRow.number)).all()
-
-
 def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
     """Records with their samples, by id."""
     rows = session.scalars(
@@ -174,7 +165,10 @@ def damaged_trials(session: Session, campaign_id: int | None = None) -> list[Tri
     The records are loaded in batches because all of them may not fit into memory.
     """
     damaged: list[TrialRow] = []
-    rows = recorded(session, campaign_id)
+    recorded = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
+    wanted = recorded if campaign_id is None else recorded.where(TrialRow.campaign_id == campaign_id)
+    lean = wanted.options(defer(TrialRow.gate), defer(TrialRow.curve), defer(TrialRow.settings))
+    rows = session.scalars(lean.order_by(TrialRow.campaign_id, TrialRow.number)).all()
     for first in range(0, len(rows), _AT_ONCE):
         some = {row.trajectory_id: row for row in rows[first : first + _AT_ONCE] if row.trajectory_id is not None}
         records = samples_of(session, some)

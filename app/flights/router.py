@@ -21,10 +21,10 @@ def create_trial(
     """Plan a trial of the proposal, a variant or custom gains and, with `fly`, request its flight at once."""
 
     def plan(session: Session) -> Trial:
-        trial = trials.create_trial(session, campaign_id, body, asking, predict=predictor.predict)
+        trial = trials.create_trial(session, campaign_id, body, asking, predictor=predictor)
         return trial if body.fly is None else service.fly_new_trial(session, trial.id, body.fly, asking)
 
-    return act(plan, ahead=lambda session: predictor.prepare(session, campaign_id, body))
+    return act(plan, ahead=lambda session: trials.prepare_trial(session, campaign_id, body, predictor))
 
 
 @router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)

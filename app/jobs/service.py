@@ -2,7 +2,7 @@
 crash.
 
 For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job` or `fail_job`;
-`requeue_job` and `requeue_or_fail_job` when it has to end before that.
+`requeue_job` when it has to end before that.
 """
 
 from collections.abc import Collection, Sequence
@@ -88,7 +88,6 @@ def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s:
     _move(row, JobState.RUNNING)
     row.worker, row.attempts = worker, row.attempts + 1
     row.started_at, row.finished_at, row.problem = utc_now(), None, None
-    row.done_share, row.doing = None, ""
     row.lease_until = utc_now() + timedelta(seconds=lease_s)
     return row
 
@@ -129,7 +128,6 @@ def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject
     if row is None:
         return False
     _move(row, JobState.DONE)
-    row.finished_at, row.lease_until = utc_now(), None
     if result is not None:
         row.result, row.done_share, row.doing = result, 1.0, ""
         older = (JobRow.kind == row.kind, _is_order(_ordered(row)), JobRow.id < row.id)
@@ -137,17 +135,12 @@ def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject
     return True
 
 
-def requeue_job(session: Session, job_id: int, *, worker: str) -> None:
-    """Queue the job again as if it had not been started, because the worker shuts down; if this worker holds it."""
+def requeue_job(session: Session, job_id: int, *, worker: str, its_process_died: bool = False) -> None:
+    """Queue the job again, if this worker holds it: as if it had not been started, because the worker shuts down; or
+    because its process died, and fail it when that has happened too often."""
     if (row := _held_by(session, job_id, worker)) is not None:
-        row.attempts -= 1
-        _requeue(row)
-
-
-def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> None:
-    """Queue the job again after its process died, or fail it when that has happened too often; if this worker holds
-    it."""
-    if (row := _held_by(session, job_id, worker)) is not None:
+        if not its_process_died:
+            row.attempts -= 1
         _requeue(row)
 
 
@@ -216,7 +209,6 @@ def cancel_job(session: Session, job_id: int) -> Job:
     row = _one(session, job_id)
     check_action(JOB_ACTIONS, "cancel", row.state, _name(row))
     _move(row, JobState.CANCELLED)
-    row.finished_at, row.lease_until = utc_now(), None
     session.flush()
     return job_view(session, row)
 
@@ -227,7 +219,6 @@ def retry_job(session: Session, job_id: int) -> Job:
     check_action(JOB_ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
     row.attempts, row.problem, row.finished_at = 0, None, None
-    row.done_share, row.doing = None, ""
     session.flush()
     return job_view(session, row)
 
@@ -303,18 +294,21 @@ def _requeue(row: JobRow) -> None:
     else:
         _move(row, JobState.QUEUED)
         row.worker, row.lease_until = None, None
-        row.done_share, row.doing = None, ""
 
 
 def _end(row: JobRow, error: GainlineError) -> None:
     _move(row, JobState.CANCELLED if isinstance(error, SupersededError) else JobState.FAILED)
     detail = "; ".join(f"{problem.field}: {problem.reason}" for problem in error.problems)
     row.problem = {"title": error.message, "detail": detail, "hint": error.hint}
-    row.finished_at, row.lease_until = utc_now(), None
 
 
 def _move(row: JobRow, to: JobState) -> None:
+    """Change the state. What waits or begins has no progress yet; what has ended has no lease."""
     row.state = check_transition(JOB_TRANSITIONS, row.state, to, _name(row))
+    if to in {JobState.QUEUED, JobState.RUNNING}:
+        row.done_share, row.doing = None, ""
+    else:
+        row.finished_at, row.lease_until = utc_now(), None
 
 
 def _name(row: JobRow) -> str:

@@ -17,6 +17,7 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from app.common.errors import StorageError
+from app.db.models import EventRow
 from app.db.outbox import DatabaseWatch, events_after, latest_event_id
 from app.db.session import Database
 from app.live.link import LiveClient
@@ -43,16 +44,6 @@ WRITTEN: Final = 2 * WAITING_TELEMETRY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
-    """One row of the outbox: which thing changed. Clients read its new state over REST."""
-
-    id: int
-    topic: str
-    entity_id: int
-    campaign_id: int | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkState:
     """Whether the worker can be reached at this moment."""
 
@@ -74,13 +65,13 @@ class Subscription:
     """Queue of one stream: all changes in order and first, then the newest telemetry."""
 
     def __init__(self) -> None:
-        self._changes: deque[Change] = deque()
+        self._changes: deque[EventRow] = deque()
         self._live: deque[LiveItem] = deque(maxlen=WAITING_TELEMETRY)
         self._ready = asyncio.Event()
         self._open = True
 
-    def push(self, item: Change | LiveItem) -> None:
-        if isinstance(item, Change):
+    def push(self, item: EventRow | LiveItem) -> None:
+        if isinstance(item, EventRow):
             self._changes.append(item)
             if len(self._changes) > WAITING_CHANGES:
                 self.end()
@@ -93,7 +84,7 @@ class Subscription:
         self._open = False
         self._ready.set()
 
-    async def __aiter__(self) -> AsyncIterator[Change | LiveItem]:
+    async def __aiter__(self) -> AsyncIterator[EventRow | LiveItem]:
         while self._open:
             if self._changes:
                 yield self._changes.popleft()
@@ -160,7 +151,7 @@ class Hub:
         """The newest status of each vehicle whose link is in that state."""
         return [status for status, _ in self._vehicles.values() if status.state == state]
 
-    def publish(self, item: Change | LiveItem) -> None:
+    def publish(self, item: EventRow | LiveItem) -> None:
         match item:
             case VehicleStatus():
                 self._vehicles[item.vehicle_id] = item, self._clock_s()
@@ -203,14 +194,12 @@ PAUSE_AFTER_TROUBLE_S: Final = 1.0
 LOOK_ANYWAY_S: Final = 5.0
 
 
-def changes_after(database: Database, event_id: int) -> Iterator[Change]:
-    """All changes after that event up to now, read in short transactions."""
+def changes_after(database: Database, event_id: int) -> Iterator[EventRow]:
+    """All changes after that event up to now, read in short transactions. They name what changed; clients read its new
+    state over REST."""
     while True:
         with database.read() as session:
-            batch = [
-                Change(id=row.id, topic=row.topic, entity_id=row.entity_id, campaign_id=row.campaign_id)
-                for row in events_after(session, event_id, limit=BATCH)
-            ]
+            batch = events_after(session, event_id, limit=BATCH)
         yield from batch
         if len(batch) < BATCH:
             return
@@ -220,7 +209,7 @@ def changes_after(database: Database, event_id: int) -> Iterator[Change]:
 class OutboxTail:
     """A thread that calls `publish(change)` for every event committed after `start`."""
 
-    def __init__(self, database: Database, publish: Callable[[Change], None]) -> None:
+    def __init__(self, database: Database, publish: Callable[[EventRow], None]) -> None:
         self._database = database
         self._publish = publish
         self._stop = threading.Event()
@@ -295,7 +284,7 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
     live = Live(data_dir)
     loop = asyncio.get_running_loop()
 
-    def publish(change: Change) -> None:
+    def publish(change: EventRow) -> None:
         with suppress(RuntimeError):  # the loop has ended
             loop.call_soon_threadsafe(live.hub.publish, change)
 

@@ -10,6 +10,7 @@ from app.autopilots.recording import Recording
 from app.autopilots.replica_check import LoopReplica, ReplicaCheck
 from app.autopilots.replicas import REPLICAS, traced
 from app.autopilots.takeoffs import Takeoff
+from app.campaigns.schemas import Definition
 from app.common.schemas import ProblemField
 from app.core.analysis.analysis import analyze
 from app.core.analysis.loop import LoggedFlight
@@ -50,9 +51,9 @@ def _flown(reader: Reader, recording: Recording, name: str) -> LoggedFlight | Se
     return reader.takeoffs(recording) if flight is None else flight
 
 
-def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[Takeoff] | manoeuvres.CopterStart:
-    """Read what a campaign starts with: the takeoffs of a Paparazzi log, or the gains proposed from a copter's, which
-    takes some seconds. Raises InputError that names what is missing or wrong."""
+def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[Takeoff] | Definition:
+    """Read what a campaign starts with: the takeoffs of a Paparazzi log, or its definition with the gains proposed from
+    a copter's, which takes some seconds. Raises InputError that names what is missing or wrong."""
     flown = _flown(*_decoded(content, companion, name), name)
     return manoeuvres.start_of(analyze(flown), name) if isinstance(flown, LoggedFlight) else flown
 

@@ -2,16 +2,15 @@
 what a campaign takes of it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.registry import EXPERIMENTS
+from app.campaigns.schemas import Definition, LogEvidence, Start
 from app.core.analysis.analysis import Analysis, Assessment
 from app.core.analysis.margin import EXTRA_LAG_S, LARGEST_MARGIN, REQUIRED_MARGIN
 from app.core.analysis.proposal import LARGEST_ACTIVITY
-from app.core.definition import LogEvidence
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.copter_steps import CopterSteps, vector_of
 from app.core.formatting import format_gains, percent
@@ -182,17 +181,9 @@ def _rounded(values: Samples) -> tuple[float, ...]:
     return tuple(round(value, 5) for value in values.tolist())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CopterStart:
-    """The experiment, the gains of the first flight by the names of its space, and what the log tells."""
-
-    experiment: str
-    gains: Mapping[str, float]
-    log: LogEvidence
-
-
-def start_of(analysis: Analysis, file_name: str) -> CopterStart:
-    """The start of a campaign with the proposed gains. Raises TrajectoryError if the analysis proposes none."""
+def start_of(analysis: Analysis, file_name: str) -> Definition:
+    """The definition of a campaign that starts with the proposed gains. Raises TrajectoryError if the analysis proposes
+    none."""
     if analysis.proposed is None:
         raise TrajectoryError(
             f"No campaign starts from {file_name}.",
@@ -204,16 +195,14 @@ def start_of(analysis: Analysis, file_name: str) -> CopterStart:
     proposed = experiment.loop_parameters(analysis.proposed.gains)
     space = experiment.space
     mean, deviation = (vector_of(each).tolist() for each in (analysis.estimate.mean, analysis.estimate.deviation))
-    return CopterStart(
-        experiment=experiment.name,
-        gains=space.mapping(space.nearest(space.vector({name: parameters[name] for name in space.names} | proposed))),
-        log=LogEvidence(
-            file_name=file_name,
-            error_m=analysis.behaviour.error_m,
-            vehicle={
-                each.name: (min(max(value, each.lower), each.upper), spread)
-                for each, value, spread in zip(experiment.model_parameters, mean, deviation, strict=True)
-            },
-            parameters=parameters,
-        ),
+    gains = space.mapping(space.nearest(space.vector({name: parameters[name] for name in space.names} | proposed)))
+    log = LogEvidence(
+        file_name=file_name,
+        error_m=analysis.behaviour.error_m,
+        vehicle={
+            each.name: (min(max(value, each.lower), each.upper), spread)
+            for each, value, spread in zip(experiment.model_parameters, mean, deviation, strict=True)
+        },
+        parameters=parameters,
     )
+    return Definition(experiment=experiment.name, start=Start(kind="given", gains=gains, log=log))

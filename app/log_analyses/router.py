@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, status
 
 from app.campaigns.schemas import Campaign
+from app.common.schemas import uploaded_name
 from app.log_analyses import service
 from app.log_analyses.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
@@ -41,9 +42,6 @@ def start_campaign(record: Record, asking: RequestContextDep, vehicle: VehicleId
     with the gains proposed from the log for the first flight. The fitted vehicle replaces the data sheet
     until then.
     """
-    from app.log_analyses import campaigns  # noqa: PLC0415 - imports the models of an analysis
-
-    found = service.read_upload(record.content(), record.read_companion(), name=record.name)
-    return record.once(
-        lambda session: campaigns.start_campaign(session, found, asking, name=record.name, vehicle_id=vehicle)
-    )
+    name = uploaded_name(record.name, unnamed=service.UNNAMED)
+    found = service.read_upload(record.content(), record.read_companion(), name=name)
+    return record.once(lambda session: service.start_campaign(session, found, asking, name=name, vehicle_id=vehicle))

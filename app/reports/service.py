@@ -289,7 +289,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     safe_gains = format_gains(vehicle.safe_gains)
     if frozen is not None and frozen != vehicle.safe_gains:
         safe_gains = f"{format_gains(frozen)} at the first flight, now {safe_gains}"
-    past = figure_data.history_of(session, campaign_id, curves=True)
+    past = figure_data.history_of(session, campaign_id, figure_data.FigureView())
     return Report(
         campaign=campaign,
         statistics=statistics,

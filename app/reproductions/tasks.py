@@ -44,7 +44,7 @@ class ReproductionJob:
             except ProcessDiedError as death:
                 _log.warning("the computing process died", name=order.name, exit_code=death.exit_code)
                 with self.database.write() as session:
-                    jobs.requeue_or_fail_job(session, job.id, worker=self.worker)
+                    jobs.requeue_job(session, job.id, worker=self.worker, its_process_died=True)
                 return
         if result is None:
             _log.info("reproduction cancelled", name=order.name)

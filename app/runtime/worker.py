@@ -26,7 +26,7 @@ from app import __version__
 from app.campaigns.computation import warm_up
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposals import PROPOSAL_JOB
-from app.campaigns.tasks import LandscapeJob, ProposalJob
+from app.campaigns.tasks import compute_landscape, compute_proposal
 from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import AlreadyRunningError, StorageError
 from app.common.logging import configure_logs, say
@@ -203,11 +203,13 @@ class Worker:
     def _build_job_runners(
         self, database: Database, pool: ComputePool, landscape_pool: ComputePool
     ) -> tuple[JobRunner, ...]:
-        proposer = ProposalJob(database, pool, worker=self.name)
+        proposer = partial(compute_proposal, database, pool, worker=self.name)
         reproducer = ReproductionJob(
             database, worker=self.name, lease_s=self.settings.lease_s, closing=self.ending.event
         )
-        landscaper = LandscapeJob(database, landscape_pool, worker=self.name, lease_s=self.settings.lease_s)
+        landscaper = partial(
+            compute_landscape, database, landscape_pool, worker=self.name, lease_s=self.settings.lease_s
+        )
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),

@@ -10,9 +10,10 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app import __version__
 from app.db.base import utc_now
+from app.db.models import EventRow
 from app.db.outbox import holds_everything_after, latest_event_before, latest_event_id
 from app.db.session import Database
-from app.live.hub import Change, LinkState, LiveItem, changes_after
+from app.live.hub import LinkState, LiveItem, changes_after
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.web.dependencies import CurrentDatabase, Live
 
@@ -56,7 +57,7 @@ async def events(
             yield _event(live, change)
             sent = change.id
         async for item in stream:
-            if isinstance(item, Change):
+            if isinstance(item, EventRow):
                 if item.id <= sent:
                     continue
                 sent = item.id
@@ -76,9 +77,9 @@ def _start(database: Database, last_event_id: str | None, since_s: float) -> tup
         return latest, False
 
 
-def _event(live: Live, item: Change | LiveItem) -> ServerSentEvent:
+def _event(live: Live, item: EventRow | LiveItem) -> ServerSentEvent:
     match item:
-        case Change():
+        case EventRow():
             return ServerSentEvent(
                 event="change",
                 id=str(item.id),

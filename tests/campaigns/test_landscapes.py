@@ -1,12 +1,12 @@
 """The landscape over HTTP: asked for once, computed as a job, drawn with the campaign's own flights."""
 
+from functools import partial
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns import landscapes, tasks
-from app.campaigns.tasks import LandscapeJob
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
@@ -37,8 +37,8 @@ def run_landscapes(database: Database) -> int:
             job_id, campaign_id, order = job.id, job.campaign_id, dict(job.order or {})
         assert campaign_id is not None
         with database.read() as session:
-            plan = landscapes.read_plan(session, campaign_id, order)
-        survey = landscapes.plan(plan)
+            past, proposal = landscapes.read_proposed(session, campaign_id, order)
+        survey = landscapes.plan(past, proposal.gains, proposal.explanation.get("base_flight"))
         assert survey is not None
         landscape = survey.landscape(survey.predict_errors(survey.points()))
         with database.write() as session:
@@ -49,7 +49,7 @@ def run_landscapes(database: Database) -> int:
 def carry_out_as_the_worker(database: Database) -> None:
     """The job that waits, with the worker's own runner."""
     with ComputePool(1, prepare=int) as pool:
-        job = LandscapeJob(database, pool, worker=WORKER, lease_s=9.0)
+        job = partial(tasks.compute_landscape, database, pool, worker=WORKER, lease_s=9.0)
         runner = JobRunner(database, landscapes.LANDSCAPE_JOB, job, room=1, worker=WORKER, lease_s=30.0)
         claimed = runner.claim()
         assert claimed is not None
@@ -124,7 +124,7 @@ def test_the_share_that_is_done_is_that_of_the_gain_sets_evaluated(
     card_of(client, campaign_id)
     told: list[tuple[float, str]] = []
     monkeypatch.setattr(tasks, "PROGRESS_EVERY_S", 0.0)
-    monkeypatch.setattr(LandscapeJob, "_report", lambda _self, _job, share, doing: told.append((share, doing)))
+    monkeypatch.setattr(jobs, "report_progress", lambda _session, _id, *progress, **_: told.append(progress))
     carry_out_as_the_worker(database)
     assert len(told) > 2
     for share, doing in told:

@@ -5,7 +5,8 @@ from fastapi.testclient import TestClient
 
 from app.campaigns.definitions import definition_of
 from app.campaigns.proposals import start_flying
-from app.campaigns.rehearsals import RehearsalTrial, rehearsal_of, rehearsal_result
+from app.campaigns.rehearsals import rehearsal_of, rehearsal_result
+from app.campaigns.repository import GatedTrial
 from app.campaigns.service import get_row
 from app.common.states import Outcome, TrialState
 from app.db import outbox
@@ -47,12 +48,12 @@ VALID, ABORTED, INVALID, LOST = TrialState.VALID, TrialState.ABORTED, TrialState
 def test_it_is_passed_by_three_valid_flights_or_its_own_stop_and_nothing_spoilt(
     states: list[TrialState], outcome: Outcome | None, expected: str
 ) -> None:
-    flown = [RehearsalTrial(number, state, gate_passed=True) for number, state in enumerate(states, start=1)]
+    flown = [GatedTrial(number, state, gate_passed=True) for number, state in enumerate(states, start=1)]
     assert rehearsal_result(flown, outcome)[0] == expected
 
 
 def test_gains_that_the_gate_refused_spoil_it() -> None:
-    flown = [RehearsalTrial(number, VALID, gate_passed=number != 2) for number in (1, 2, 3)]
+    flown = [GatedTrial(number, VALID, gate_passed=number != 2) for number in (1, 2, 3)]
     assert rehearsal_result(flown, None) == ("failed", "the gate refused the gains of flight 2 and was overruled")
 
 

@@ -157,8 +157,8 @@ class States:
         """Compute the error landscape of the latest proposal."""
         with self._database.read() as session:
             order: Json = {"name": f"campaign {campaign_id}", "proposal_id": _proposed(session, campaign_id).id}
-            plan = landscapes.read_plan(session, campaign_id, order)
-        survey = landscapes.plan(plan)
+            past, proposal = landscapes.read_proposed(session, campaign_id, order)
+        survey = landscapes.plan(past, proposal.gains, proposal.explanation.get("base_flight"))
         assert survey is not None, "there is nothing to draw"
         found = survey.landscape(survey.predict_errors(survey.points()))
 

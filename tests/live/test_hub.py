@@ -4,16 +4,20 @@ import asyncio
 import sqlite3
 import threading
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+from app.db.models import EventRow
 from app.db.outbox import DatabaseWatch
-from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, LiveItem
+from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Hub, LinkState, LiveItem
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from tests.waiting import Waits
 
 
-def change(number: int) -> Change:
-    return Change(id=number, topic="trial", entity_id=7, campaign_id=1)
+@cache
+def change(number: int) -> EventRow:
+    """The same row for the same number: rows are equal only to themselves."""
+    return EventRow(id=number, topic="trial", entity_id=7, campaign_id=1)
 
 
 def telemetry(time_s: float) -> Telemetry:
@@ -21,7 +25,7 @@ def telemetry(time_s: float) -> Telemetry:
 
 
 def test_a_slow_stream_gets_every_change_and_only_the_newest_telemetry() -> None:
-    async def scenario() -> list[Change | LiveItem]:
+    async def scenario() -> list[EventRow | LiveItem]:
         hub = Hub()
         with hub.subscribe() as stream:
             for number in range(500):
@@ -31,19 +35,19 @@ def test_a_slow_stream_gets_every_change_and_only_the_newest_telemetry() -> None
             return [await anext(items) for _ in range(500 + WAITING_TELEMETRY)]
 
     items = asyncio.run(scenario())
-    assert [item.id for item in items if isinstance(item, Change)] == list(range(500))
+    assert [item.id for item in items if isinstance(item, EventRow)] == list(range(500))
     assert [item.time_s for item in items if isinstance(item, Telemetry)] == [float(n) for n in range(400, 500)]
 
 
 def test_two_streams_see_the_same() -> None:
-    async def collect(hub: Hub, items: list[Change | LiveItem]) -> None:
+    async def collect(hub: Hub, items: list[EventRow | LiveItem]) -> None:
         with hub.subscribe() as stream:
             items.extend([item async for item in stream])
 
-    async def scenario() -> tuple[list[Change | LiveItem], list[Change | LiveItem]]:
+    async def scenario() -> tuple[list[EventRow | LiveItem], list[EventRow | LiveItem]]:
         hub = Hub()
-        first: list[Change | LiveItem] = []
-        second: list[Change | LiveItem] = []
+        first: list[EventRow | LiveItem] = []
+        second: list[EventRow | LiveItem] = []
         tasks = [asyncio.create_task(collect(hub, items)) for items in (first, second)]
         await asyncio.sleep(0)
         for item in (change(1), telemetry(0.1), LinkState(worker=False), change(2)):
@@ -87,7 +91,7 @@ def test_a_stream_that_joins_late_is_told_how_the_vehicles_are_while_there_is_a_
     def status(vehicle_id: int, altitude_m: float) -> VehicleStatus:
         return VehicleStatus(vehicle_id=vehicle_id, state="connected", at="", step="record", altitude_m=altitude_m)
 
-    async def first_heard(hub: Hub, count: int) -> list[Change | LiveItem]:
+    async def first_heard(hub: Hub, count: int) -> list[EventRow | LiveItem]:
         with hub.subscribe() as stream:
             hub.publish(change(1))
             items = aiter(stream)

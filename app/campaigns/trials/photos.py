@@ -1,5 +1,6 @@
 """Photos of flights, stored as uploaded."""
 
+import re
 from typing import Final
 
 from sqlalchemy import func, select
@@ -15,20 +16,16 @@ MAX_BYTES: Final = 10 * 2**20
 MAX_PER_TRIAL: Final = 20
 ENDINGS: Final = {"image/jpeg": "jpg", "image/png": "png", "image/webp": "webp"}
 """File extensions by media type; every browser shows these types."""
-_JPEG: Final = b"\xff\xd8\xff"
-_PNG: Final = b"\x89PNG\r\n\x1a\n"
-_RIFF, _WEBP = b"RIFF", b"WEBP"
+_FIRST_BYTES: Final = {
+    "image/jpeg": re.compile(rb"\xff\xd8\xff"),
+    "image/png": re.compile(rb"\x89PNG\r\n\x1a\n"),
+    "image/webp": re.compile(rb"RIFF.{4}WEBP", re.DOTALL),
+}
 
 
 def media_type_of(content: bytes) -> str | None:
     """Media type of a picture by its first bytes, whatever its file name; None if it is not an accepted type."""
-    if content.startswith(_JPEG):
-        return "image/jpeg"
-    if content.startswith(_PNG):
-        return "image/png"
-    if content.startswith(_RIFF) and content[8:12] == _WEBP:
-        return "image/webp"
-    return None
+    return next((media_type for media_type, begins in _FIRST_BYTES.items() if begins.match(content)), None)
 
 
 def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:

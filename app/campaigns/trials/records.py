@@ -18,10 +18,11 @@ from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
+from app.campaigns.flight_predictions import TrialPredictor
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.campaigns.trials.schemas import Trial, TrialPlan
-from app.campaigns.trials.service import Predict, create_trial, gated_gains, require_open
+from app.campaigns.trials.service import create_trial, gated_gains, require_open
 from app.campaigns.trials.views import trial_view, units_of
 from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
@@ -267,10 +268,10 @@ def plan_and_import(
     *,
     confirmed: bool,
     invalid: bool,
-    predict: Predict | None = None,
+    predictor: TrialPredictor | None = None,
 ) -> Trial:
     """Plan a trial and import its record. Raises what `create_trial` and `import_record` raise."""
-    planned = create_trial(session, campaign_id, plan, context, predict=predict)
+    planned = create_trial(session, campaign_id, plan, context, predictor=predictor)
     return import_record(session, planned.id, flown, context, confirmed=confirmed, invalid=invalid)
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 
-from app.campaigns.flight_predictions import PredictorCache
+from app.campaigns.flight_predictions import PredictorCache, TrialPredictor
 from app.campaigns.schemas import Campaign, ConsideredGains
 from app.campaigns.trials import photos, records, reviews, service
 from app.campaigns.trials.schemas import (
@@ -38,11 +38,11 @@ from app.web.dependencies import (
 )
 
 
-async def _trial_predictor(predictors: Annotated[PredictorCache, of_app("predictors")]) -> service.TrialPredictor:
-    return service.TrialPredictor(predictors)
+async def _trial_predictor(predictors: Annotated[PredictorCache, of_app("predictors")]) -> TrialPredictor:
+    return TrialPredictor(predictors)
 
 
-TrialPredictorDep = Annotated[service.TrialPredictor, Depends(_trial_predictor)]
+TrialPredictorDep = Annotated[TrialPredictor, Depends(_trial_predictor)]
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
 
@@ -69,7 +69,7 @@ def reopen_campaign(
 ) -> Campaign:
     """Reopen a finished campaign for more flights."""
     asked = body or Reopening()
-    return act(lambda session: service.reopen_campaign(session, campaign_id, asked, asking, predict=predictor.predict))
+    return act(lambda session: service.reopen_campaign(session, campaign_id, asked, asking, predictor=predictor))
 
 
 @router.get("/trials/{trial_id}")
@@ -192,9 +192,9 @@ def import_flight(
     flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(
         lambda session: records.plan_and_import(
-            session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid, predict=predictor.predict
+            session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid, predictor=predictor
         ),
-        ahead=lambda session: predictor.prepare(session, campaign_id, plan),
+        ahead=lambda session: service.prepare_trial(session, campaign_id, plan, predictor),
     )
 
 

@@ -4,9 +4,9 @@ Every gain set passes the gate before it becomes a trial; an operator may overru
 predicted for a trial is kept with it, also for gains that no proposal contains.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Final
 
@@ -17,7 +17,7 @@ from app.autopilots.registry import evidence_of
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
-from app.campaigns.flight_predictions import DatedPrediction, PredictorCache, predict_ahead, predict_planned
+from app.campaigns.flight_predictions import TrialPredictor
 from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.schemas import Campaign, Variant
 from app.campaigns.trials.schemas import Reopening, Trial, TrialEdit, TrialPlan
@@ -31,7 +31,6 @@ from app.core.errors import TrajectoryError
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
-from app.core.tuning.strategy import Proposal
 from app.db.base import JsonObject, added
 from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.db.pages import Order, page_of
@@ -141,28 +140,13 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return trial_view(session, history.trial_row(session, trial_id))
 
 
-Predict = Callable[[Session, CampaignRow, Gains], Proposal | None]
-"""What is predicted for gains that no proposal contains, with its curve in as many samples as are stored."""
-
-
-@dataclass(slots=True)
-class TrialPredictor:
-    """Predicts the trial of one request as the dashboard shows it."""
-
-    cache: PredictorCache
-    _ahead: DatedPrediction | None = field(default=None, init=False)
-
-    def prepare(self, session: Session, campaign_id: int, new: TrialPlan) -> None:
-        """Run the gate's simulations, whose results are kept, and predict the trial before the transaction of
-        `create_trial`. Problems with the trial are reported by `create_trial`."""
-        with suppress(GainlineError):
-            judged, _ = _chosen(session, campaigns.get_row(session, campaign_id), new)
-            if new.proposal_id is None:
-                self._ahead = predict_ahead(session, self.cache, campaign_id, judged.gains)
-
-    def predict(self, session: Session, campaign: CampaignRow, gains: Gains) -> Proposal | None:
-        """What is predicted for a trial with these gains, as it is stored with it."""
-        return predict_planned(session, campaign, gains, self._ahead)
+def prepare_trial(session: Session, campaign_id: int, new: TrialPlan, predictor: TrialPredictor) -> None:
+    """Run the gate's simulations, whose results are kept, and predict the trial before the transaction of
+    `create_trial`. Problems with the trial are reported by `create_trial`."""
+    with suppress(GainlineError):
+        judged, _ = _chosen(session, campaigns.get_row(session, campaign_id), new)
+        if new.proposal_id is None:
+            predictor.prepare(session, campaign_id, judged.gains)
 
 
 def create_trial(
@@ -171,9 +155,9 @@ def create_trial(
     new: TrialPlan,
     context: RequestContext = LOCAL_CLI,
     *,
-    predict: Predict | None = None,
+    predictor: TrialPredictor | None = None,
 ) -> Trial:
-    """Plan a trial. Without `predict`, only the gains of a proposal have a prediction.
+    """Plan a trial. Without a `predictor`, only the gains of a proposal have a prediction.
 
     Raises ConflictError for a stale proposal, an unclassified flight, a spent budget, a campaign that is over or not
     ready; GainsError that names what the gate refuses, unless that is overruled; and NotAllowedError when the client
@@ -196,7 +180,7 @@ def create_trial(
         note=new.note,
         seed=flight_seed(definition_of(campaign).seed, number),
     )
-    found = None if proposal is not None or predict is None else predict(session, campaign, gains)
+    found = None if proposal is not None or predictor is None else predictor.predict(session, campaign, gains)
     if proposal is not None:
         row.proposal_id = proposal.id
         row.predicted_error, row.predicted_interval = proposal.predicted_error, proposal.interval
@@ -209,12 +193,17 @@ def create_trial(
 
 
 def reopen_campaign(
-    session: Session, campaign_id: int, asked: Reopening, context: RequestContext, *, predict: Predict | None = None
+    session: Session,
+    campaign_id: int,
+    asked: Reopening,
+    context: RequestContext,
+    *,
+    predictor: TrialPredictor | None = None,
 ) -> Campaign:
     """Reopen a finished campaign, and plan trials. Raises what `create_trial` and `campaigns.reopen_campaign` raise."""
     campaigns.reopen_campaign(session, campaign_id, asked.flights, context)
     for variant in asked.plan:
-        create_trial(session, campaign_id, TrialPlan(variant=variant), context, predict=predict)
+        create_trial(session, campaign_id, TrialPlan(variant=variant), context, predictor=predictor)
     return campaigns.get_campaign(session, campaign_id)
 
 

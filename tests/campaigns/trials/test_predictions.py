@@ -196,7 +196,7 @@ def test_a_curve_that_cannot_be_stored_does_not_prevent_the_trial(
             kind="manual", gains={}, predicted=curve, predicted_error=9.0, explanation=Explanation(summary="")
         )
 
-    monkeypatch.setattr("app.campaigns.trials.service.predict_planned", diverge)
+    monkeypatch.setattr("app.campaigns.flight_predictions.TrialPredictor.predict", diverge)
     planned = create_trial(client, campaign["id"], gains=OWN)
     assert planned["predicted_error"] == 9.0
     assert drawn(client, campaign["id"]) == {}

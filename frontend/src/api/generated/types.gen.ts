@@ -264,15 +264,31 @@ export type Campaign = {
      */
     id: number;
     /**
-     * Version
-     */
-    version: number;
-    /**
      * Name
      */
     name: string;
     state: CampaignState;
     outcome: Outcome | null;
+    vehicle: CampaignVehicle;
+    best: BestTrial | null;
+    /**
+     * Verdict
+     *
+     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
+    /**
+     * Next Action
+     */
+    next_action: string;
+    /**
+     * Updated At
+     */
+    updated_at: string;
+    /**
+     * Version
+     */
+    version: number;
     /**
      * Stop Reason
      */
@@ -290,7 +306,6 @@ export type Campaign = {
      * number of flights up to which no stop rule ends it, because it was reopened
      */
     open_until_flight: number;
-    vehicle: CampaignVehicle;
     /**
      * Parent Id
      */
@@ -302,13 +317,6 @@ export type Campaign = {
      * the campaign that this one rehearses
      */
     rehearses: number | null;
-    best: BestTrial | null;
-    /**
-     * Verdict
-     *
-     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
-     */
-    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     winner: Winner | null;
     /**
      * Standing
@@ -319,10 +327,6 @@ export type Campaign = {
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
-     * Next Action
-     */
-    next_action: string;
-    /**
      * Actions
      *
      * allowed actions: plan, define, finish, archive, …
@@ -332,10 +336,6 @@ export type Campaign = {
      * Created At
      */
     created_at: string;
-    /**
-     * Updated At
-     */
-    updated_at: string;
 };
 
 /**
@@ -443,6 +443,21 @@ export type CampaignSummary = {
     state: CampaignState;
     outcome: Outcome | null;
     vehicle: CampaignVehicle;
+    best: BestTrial | null;
+    /**
+     * Verdict
+     *
+     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
+    /**
+     * Next Action
+     */
+    next_action: string;
+    /**
+     * Updated At
+     */
+    updated_at: string;
     /**
      * Experiment
      */
@@ -455,17 +470,10 @@ export type CampaignSummary = {
      * Flights
      */
     flights: number;
-    best: BestTrial | null;
     /**
      * First Error
      */
     first_error: number | null;
-    /**
-     * Verdict
-     *
-     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
-     */
-    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Rehearsal
      */
@@ -477,17 +485,9 @@ export type CampaignSummary = {
      */
     has_passed_as_rehearsal: boolean;
     /**
-     * Next Action
-     */
-    next_action: string;
-    /**
      * Spark
      */
     spark: Array<SparkCurve>;
-    /**
-     * Updated At
-     */
-    updated_at: string;
 };
 
 /**
