@@ -7,7 +7,7 @@ from pathlib import Path
 
 from app.core.clock import REAL_TIME
 from app.flights.flight_loop import FlightExecution
-from app.flights.process_messages import CancelFlight, CancelTakeOff, FlightRequest, TakeOffCommand, ToVehicleProcess
+from app.flights.process_messages import CancelFlight, FlightRequest, TakeOffDecision, ToVehicleProcess
 from app.live.messages import Telemetry
 from app.vehicles.base import SafeGainsError, Vehicle
 from app.vehicles.flight_end import StopRequest
@@ -33,14 +33,11 @@ class DirectFlight(FlightExecution):
         super().__init__(REAL_TIME, show)
         self._hold = hold
         self._trial_parameters = trial_parameters
-        self._answer: ToVehicleProcess = CancelTakeOff()
+        self._answer = TakeOffDecision(None)
         self.error: Exception | None = None
 
-    def take_off(self) -> None:
-        self._answer = TakeOffCommand(by_s=math.inf)
-
-    def cancel_take_off(self) -> None:
-        self._answer = CancelTakeOff()
+    def decide(self, takes_off: bool) -> None:
+        self._answer = TakeOffDecision(math.inf if takes_off else None)
 
     def cancel_flight(self, trial_id: int, request: StopRequest) -> None:
         self._note(CancelFlight(trial_id, request))

@@ -1,7 +1,7 @@
 """Messages between the worker and a process that flies a vehicle, whichever kind of process that is; one of them is the
 vehicle's status, with its readiness for the flight that it waits for.
 
-    worker    FlightRequest →             → TakeOffCommand | CancelTakeOff →
+    worker    FlightRequest →             → TakeOffDecision →
     process                   GainsStaged →   Telemetry … FlightLanded → SafeGainsRestored → FlightFinished
 
 `CancelFlight` may come at any moment; `FlightFailure` takes the place of the messages that do not come.
@@ -74,24 +74,17 @@ class FlightRequest:
 
 @dataclass(frozen=True, slots=True)
 class GainsStaged:
-    """From the process, which then waits for TakeOffCommand or CancelTakeOff."""
+    """From the process, which then waits for TakeOffDecision."""
 
     read_back: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class TakeOffCommand:
-    """To the process: the gains are verified and the lift-off is recorded.
+class TakeOffDecision:
+    """To the process: the gains are verified and the lift-off is recorded, so take off, but not after `by_s` of this
+    computer's monotonic clock, s; None: this flight does not take place."""
 
-    Not to be carried out after `by_s` of this computer's monotonic clock, s.
-    """
-
-    by_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class CancelTakeOff:
-    """To the process: this flight does not take place."""
+    by_s: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +206,7 @@ class CommandForwarded:
 
 
 FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | StagingLost | FlightMessage
-ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
+ToVehicleProcess = FlightRequest | TakeOffDecision | CancelFlight | VehicleRequest | VehicleCommand
 
 Publish = Callable[[PublishedMessage], None]
 

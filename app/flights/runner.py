@@ -168,10 +168,7 @@ class FlightRunner:
             ended = FlightOutcome(
                 problem=f"The flight was not started, because its start could not be recorded: {error}"
             )
-        if ended.lifted_off:
-            backend.take_off()
-        else:
-            backend.cancel_take_off()
+        backend.decide(ended.lifted_off)
         return ended
 
     def _await_takeoff_clearance(
