@@ -8,7 +8,6 @@ was taken. In flight a loss takes nothing back, but tells the operator what the 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
@@ -54,89 +53,85 @@ class LossText:
     keeps: ReadinessStep | None = "control"
 
 
-LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
-    {
-        "worker away": LossText(
-            what="The worker is not responding. No commands can be sent.",
-            way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
-            "with `gainline worker`. Then stage the flight again.",
-            way_on_planned="Gainline restarts its own worker within seconds. If the worker runs separately, start it "
-            "again with `gainline worker`.",
-            what_in_flight="The worker is not responding.",
-            way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
-            "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
-        ),
-        "not connected": LossText(
-            what="The vehicle is not connected.",
-            way_on="Connect it on its page, then stage the flight.",
-            what_in_flight="Gainline's connection to the vehicle has ended.",
-            way_on_in_flight="Use the vehicle's own remote control.",
-        ),
-        "process silent": LossText(
-            what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
-            way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
-            way_on_planned="Wait until it responds. If it does not, restart the worker.",
-            what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
-            way_on_in_flight="Use the vehicle's own remote control.",
-        ),
-        "link silent": LossText(
-            what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on="Check its power and its radio. It is ready again once its gains have been read back.",
-            way_on_planned="Check its power and its radio.",
-            what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
-            "control.",
-        ),
-        "gains unknown": LossText(
-            what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
-            way_on="Stage the flight again.",
-            way_on_planned="Select Check now on its page, or stage the flight.",
-        ),
-        "battery low": LossText(
-            what="The battery voltage is below the vehicle's minimum.",
-            way_on="Insert a charged battery, then stage the flight again.",
-            way_on_planned="Insert a charged battery, then stage the flight.",
-            keeps="staged",
-        ),
-        "checks failed": LossText(
-            what="A preflight check has failed.",
-            way_on="Unstage the flight, correct the failed item, then select Check now on the vehicle's page.",
-            way_on_planned="Correct the failed item, then select Check now on the vehicle's page.",
-            keeps="staged",
-        ),
-        "quarantined": LossText(
-            what="The vehicle is quarantined.",
-            way_on="Inspect it, then release it on its page.",
-            keeps=None,
-        ),
-        "control ended": LossText(
-            what="You are not in control of the vehicle.",
-            way_on="Take control.",
-            way_on_watching="Only its operator can start the takeoff.",
-            keeps=None,
-        ),
-        "controlled by other": LossText(
-            what="Another operator is in control of the vehicle.",
-            way_on="Only that operator can start the takeoff. To start it yourself, take over.",
-            way_on_watching="Only that operator can start the takeoff.",
-            keeps="held",
-        ),
-    }
-)
+LOSSES: Final[Mapping[LossKind, LossText]] = {
+    "worker away": LossText(
+        what="The worker is not responding. No commands can be sent.",
+        way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
+        "with `gainline worker`. Then stage the flight again.",
+        way_on_planned="Gainline restarts its own worker within seconds. If the worker runs separately, start it "
+        "again with `gainline worker`.",
+        what_in_flight="The worker is not responding.",
+        way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
+        "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
+    ),
+    "not connected": LossText(
+        what="The vehicle is not connected.",
+        way_on="Connect it on its page, then stage the flight.",
+        what_in_flight="Gainline's connection to the vehicle has ended.",
+        way_on_in_flight="Use the vehicle's own remote control.",
+    ),
+    "process silent": LossText(
+        what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
+        way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
+        way_on_planned="Wait until it responds. If it does not, restart the worker.",
+        what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
+        way_on_in_flight="Use the vehicle's own remote control.",
+    ),
+    "link silent": LossText(
+        what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
+        way_on="Check its power and its radio. It is ready again once its gains have been read back.",
+        way_on_planned="Check its power and its radio.",
+        what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
+        way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
+        "control.",
+    ),
+    "gains unknown": LossText(
+        what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
+        way_on="Stage the flight again.",
+        way_on_planned="Select Check now on its page, or stage the flight.",
+    ),
+    "battery low": LossText(
+        what="The battery voltage is below the vehicle's minimum.",
+        way_on="Insert a charged battery, then stage the flight again.",
+        way_on_planned="Insert a charged battery, then stage the flight.",
+        keeps="staged",
+    ),
+    "checks failed": LossText(
+        what="A preflight check has failed.",
+        way_on="Unstage the flight, correct the failed item, then select Check now on the vehicle's page.",
+        way_on_planned="Correct the failed item, then select Check now on the vehicle's page.",
+        keeps="staged",
+    ),
+    "quarantined": LossText(
+        what="The vehicle is quarantined.",
+        way_on="Inspect it, then release it on its page.",
+        keeps=None,
+    ),
+    "control ended": LossText(
+        what="You are not in control of the vehicle.",
+        way_on="Take control.",
+        way_on_watching="Only its operator can start the takeoff.",
+        keeps=None,
+    ),
+    "controlled by other": LossText(
+        what="Another operator is in control of the vehicle.",
+        way_on="Only that operator can start the takeoff. To start it yourself, take over.",
+        way_on_watching="Only that operator can start the takeoff.",
+        keeps="held",
+    ),
+}
 
-_REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
-    {
-        TrialState.PLANNED: "control",
-        TrialState.STAGED: "staged",
-        TrialState.FLYING: "in flight",
-        TrialState.LOST: "landed",
-        TrialState.CAPTURED: "landed",
-        TrialState.VALID: "reviewed",
-        TrialState.ABORTED: "reviewed",
-        TrialState.INVALID: "reviewed",
-        TrialState.CANCELLED: None,
-    }
-)
+_REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = {
+    TrialState.PLANNED: "control",
+    TrialState.STAGED: "staged",
+    TrialState.FLYING: "in flight",
+    TrialState.LOST: "landed",
+    TrialState.CAPTURED: "landed",
+    TrialState.VALID: "reviewed",
+    TrialState.ABORTED: "reviewed",
+    TrialState.INVALID: "reviewed",
+    TrialState.CANCELLED: None,
+}
 _IN_FLIGHT: Final = STEPS.index("in flight")
 _BEFORE_TAKEOFF: Final = frozenset({"preflight", "arm"})
 _ON_THE_GROUND: Final = frozenset({"restore", "idle"})
