@@ -59,11 +59,10 @@ class WorkerSupervisor:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._stopping = threading.Event()
-        self._process: BaseProcess | None = None
+        self._process = self._start()
         self._thread = threading.Thread(target=self._watch, name="worker supervisor", daemon=True)
 
     def __enter__(self) -> Self:
-        self._process = self._start()
         self._thread.start()
         return self
 
@@ -71,8 +70,6 @@ class WorkerSupervisor:
         self._stopping.set()
         self._thread.join()
         process = self._process
-        if process is None:
-            return
         if process.is_alive():
             process.terminate()
         try:
@@ -95,7 +92,6 @@ class WorkerSupervisor:
         started_s = time.monotonic()
         while not self._stopping.is_set():
             process = self._process
-            assert process is not None
             process.join(0.1)
             if process.is_alive() or self._stopping.is_set():
                 continue
