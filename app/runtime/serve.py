@@ -15,7 +15,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
-from types import FrameType
 from typing import Final, Self
 
 import structlog
@@ -129,7 +128,8 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         announce(narrowed)
     with ExitStack() as stack:
         for number in (signal.SIGINT, signal.SIGTERM):
-            stack.callback(signal.signal, number, signal.signal(number, _exit))
+            # Unwinds the stack. Uvicorn handles signals while it runs, and raises them again after its shutdown.
+            stack.callback(signal.signal, number, signal.signal(number, lambda *_: sys.exit(0)))
         try:
             sign = stack.enter_context(exclusive(settings.data_dir / "server.lock"))
         except LockedError as error:
@@ -177,8 +177,3 @@ def listen(host: str, port: int) -> socket.socket:
                 problem = Problem("host", f"{host} is not an address of this computer ({error.strerror or error})")
                 hint = "Use --host 127.0.0.1 (this computer only) or one of this computer's addresses."
         raise AddressError(f"Gainline cannot listen on {host}, port {port}.", hint=hint, problems=(problem,)) from error
-
-
-def _exit(_signal: int, _frame: FrameType | None) -> None:
-    """Unwind the stack. Uvicorn handles signals while it runs, and raises them again after its shutdown."""
-    raise SystemExit(0)

@@ -17,7 +17,6 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from types import FrameType
 from typing import Final
 
 import structlog
@@ -119,9 +118,6 @@ class Worker:
         separate thread handles it."""
         asked: queue.SimpleQueue[str] = queue.SimpleQueue()
 
-        def note(number: int, _frame: FrameType | None) -> None:
-            asked.put(signal.Signals(number).name)
-
         def handle_signals() -> None:
             while True:
                 self.end(f"the worker was stopped ({asked.get()})")
@@ -129,7 +125,7 @@ class Worker:
 
         threading.Thread(target=handle_signals, name="signals", daemon=True).start()
         for number in signals:
-            signal.signal(number, note)
+            signal.signal(number, lambda number, _frame: asked.put(signal.Signals(number).name))
 
     def run(self, *, keep_waiting: Callable[[], bool]) -> None:
         """Prepare the data folder and the logs, take the lock, and work."""
@@ -236,11 +232,13 @@ class Worker:
             runner.heartbeat()
 
     def _until_stored(self, work: Callable[[], None]) -> None:
-        def refused(error: StorageError) -> None:
-            _log.error("the worker cannot start", why=str(error))
-
         if not self.closing.is_set():
-            retry_until_stored(work, refused, closing=self.closing, clock=REAL_TIME)
+            retry_until_stored(
+                work,
+                lambda error: _log.error("the worker cannot start", why=str(error)),
+                closing=self.closing,
+                clock=REAL_TIME,
+            )
 
     def _hello(self) -> WorkerHello:
         return WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids())
