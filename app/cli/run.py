@@ -38,8 +38,7 @@ from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.registration import register_vehicle
 from app.fleet.schemas import NewVehicle, VehicleChoice
-from app.flights.direct_flight import DirectFlight
-from app.flights.runner import FlightRunner
+from app.flights.runner import DirectFlight, FlightRunner
 from app.flights.service import fly_new_trial
 from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry
@@ -267,8 +266,9 @@ class _Display:
     def landed(self, trial: TrialRow, kind: str) -> None:
         self.trials.append(trial)
         self.kinds.append(kind)
+        error = "no error" if trial.error is None else f"{trial.error:.4f} {self._unit}"
         self.progress.console.print(
-            f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
+            f"flight {trial.number}: {format_gains(trial.gains)} → {error} "
             f"({trial.state}{f': {reason}' if (reason := reason_of(trial)) else ''})",
             highlight=False,
         )
@@ -299,7 +299,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
         out.print(f"Gate overruled: {named_flights(overruled)}.")
     out.print(f"Stopped: {stopped_because}")
     if best is not None:
-        out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")
+        out.print(f"Best: {best.error:.4f} {unit} with {format_gains(best.gains)}, flight {best.number}.")
     if not get_kind(file.vehicle.kind).is_real:
         return  # a new vehicle for each flight
     if display.held is not None:
@@ -346,7 +346,3 @@ def _prediction(trial: TrialRow, trials: Sequence[TrialRow]) -> tuple[float | No
     return history.told_prediction(
         trial.predicted_error, trial.predicted_interval, corrected=history.is_corrected(trials, trial.number)
     )
-
-
-def _error(value: float | None, unit: str) -> str:
-    return "no error" if value is None else f"{value:.4f} {unit}"

@@ -24,7 +24,6 @@ from app.flights.flight_loop import (
 from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S
 from app.flights.process_messages import (
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     FlightMessage,
     FlightRequest,
@@ -42,6 +41,7 @@ from app.live.messages import SILENT_AFTER_S, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
     ConnectedVehicle,
+    ConnectionOpened,
     InterruptedByOrderError,
     SafeGainsError,
     Vehicle,

@@ -30,7 +30,6 @@ from app.flights.flight_loop import run_simulations
 from app.flights.process_messages import (
     CancelFlight,
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     FlightFailure,
     FlightFinished,
@@ -47,7 +46,7 @@ from app.flights.process_messages import (
 )
 from app.live.messages import NO_LINK, SILENT_AFTER_S, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
-from app.vehicles.base import SafeGainsError, VehicleError
+from app.vehicles.base import ConnectionOpened, SafeGainsError, VehicleError
 from app.vehicles.flight_end import StopRequest
 
 NOT_ANSWERING: Final = (

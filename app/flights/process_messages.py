@@ -8,7 +8,7 @@ vehicle's status, with its readiness for the flight that it waits for.
 """
 
 import datetime as dt
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal
@@ -20,7 +20,6 @@ from app.core.experiments.base import Experiment
 from app.live.messages import (
     SILENT_AFTER_S,
     FlightPhase,
-    PublishedMessage,
     Telemetry,
     UnreadyReason,
     VehicleCommandKind,
@@ -30,6 +29,7 @@ from app.vehicles.base import (
     CheckItem,
     Condition,
     ConnectedVehicle,
+    ConnectionOpened,
     FlightOptions,
     FlightRecord,
     Identity,
@@ -153,15 +153,6 @@ class ConnectionRequest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ConnectionOpened:
-    """From the process: the link is open; `concern` is why the vehicle may only be observed."""
-
-    identity: Identity
-    concern: str
-    held: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleRequest:
     """To the process: carry out this act, for a vehicle with these safe gains."""
 
@@ -207,8 +198,6 @@ class CommandForwarded:
 
 FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | StagingLost | FlightMessage
 ToVehicleProcess = FlightRequest | TakeOffDecision | CancelFlight | VehicleRequest | VehicleCommand
-
-Publish = Callable[[PublishedMessage], None]
 
 Staging = Literal["none", "staged", "silent", "lost"]
 """Of the flight that waits for its takeoff: nothing staged, the staged gains read back, a silence since then, or the

@@ -133,8 +133,6 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = {
     TrialState.CANCELLED: None,
 }
 _IN_FLIGHT: Final = STEPS.index("in flight")
-_BEFORE_TAKEOFF: Final = frozenset({"preflight", "arm"})
-_ON_THE_GROUND: Final = frozenset({"restore", "idle"})
 _BEGINS_WITHIN_S: Final = 3.0
 """A vehicle on the ground this long after the takeoff was requested has not taken off yet; later it has landed."""
 _WITHOUT_LINK: Final = LossText(
@@ -222,7 +220,12 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Ste
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), _in_flight(kinds, texts)
+        in_flight = tuple(
+            Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
+            for kind in kinds
+            if texts[kind].what_in_flight
+        )
+        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), in_flight
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     keeps = [texts[kind].keeps for kind in kinds]
@@ -238,9 +241,9 @@ def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessSt
     a lost link it is not known to have landed."""
     step = "" if report.status is None or not standing.has_link else report.status.step
     is_starting = step == "idle" and standing.flown_for_s < _BEGINS_WITHIN_S
-    if step in _BEFORE_TAKEOFF or is_starting:
+    if step in {"preflight", "arm"} or is_starting:
         return "held"
-    return "landed" if step in _ON_THE_GROUND and _link_loss(standing, report) is None else "in flight"
+    return "landed" if step in {"restore", "idle"} and _link_loss(standing, report) is None else "in flight"
 
 
 def require_ready(readiness: TrialReadiness) -> None:
@@ -296,11 +299,3 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     if status.state == "gone":
         return "link silent"
     return status.unready or None
-
-
-def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tuple[Loss, ...]:
-    return tuple(
-        Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
-        for kind in kinds
-        if texts[kind].what_in_flight
-    )

@@ -21,7 +21,6 @@ from app.flights.flight_loop import PipeClosedError, WorkerPipe
 from app.flights.process_messages import (
     CancelFlight,
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     FlightFailure,
     FlightFinished,
@@ -34,7 +33,7 @@ from app.flights.process_messages import (
     VehicleCommand,
     VehicleRequest,
 )
-from app.vehicles.base import Identity, LinkedVehicle
+from app.vehicles.base import ConnectionOpened, Identity, LinkedVehicle
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
