@@ -53,7 +53,13 @@ def import_log(
         out.print(f"  {escape(note)}", style="dim")
     with _open_database(settings) as database:
         stored = _store(database, campaign, trial, flown, yes=yes)
-    _print(out, stored)
+    error = "no error" if stored.error is None else f"error {stored.error:.4f}"
+    flight = f"Trial {stored.number} of campaign {stored.campaign_id}"
+    out.print(f"{flight}, {format_gains(stored.gains)}: {stored.state}, {error}.")
+    if stored.reason:
+        out.print(escape(stored.reason))
+    for glitch in stored.glitches:
+        out.print(escape(glitch.sentence))
     write_json(json_out, stored.model_dump(mode="json"))
 
 
@@ -108,17 +114,6 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
             accepted |= {problem.field for problem in needed.problems}
 
 
-def _print(out: Console, trial: Trial) -> None:
-    error = "no error" if trial.error is None else f"error {trial.error:.4f}"
-    out.print(
-        f"Trial {trial.number} of campaign {trial.campaign_id}, {format_gains(trial.gains)}: {trial.state}, {error}."
-    )
-    if trial.reason:
-        out.print(escape(trial.reason))
-    for glitch in trial.glitches:
-        out.print(escape(glitch.sentence))
-
-
 def analyze_log(file: Path, *, gains: str, json_out: Path | None, params_out: Path | None) -> None:
     """Print the analysis of a log, and write it and the proposed parameters where asked for.
 
@@ -132,37 +127,32 @@ def analyze_log(file: Path, *, gains: str, json_out: Path | None, params_out: Pa
     answer, _ = analyze_content(content, companion, file.name, gains)
     out = console(json_out)
     out.print(f"[bold]{escape(answer.file_name)}[/]")
-    _print_tuning(out, answer.tuning)
+    tuning, replica = answer.tuning, answer.replica
+    if isinstance(tuning, Refusal):
+        _print_refusal(out, "No gains", tuning)
+    else:
+        facts = [f"Flight: {', '.join(tuning.flight)}.", f"Vehicle: {', '.join(tuning.vehicle)}."]
+        _print_answer(out, facts, tuning, tuning.gains, "This flight with other gains")
     out.print()
-    _print_replica(out, answer.replica)
+    if isinstance(replica, Refusal):
+        _print_refusal(out, "Not compared with the replica of the controller", replica)
+    else:
+        facts = [f"Replica of the controller: {', '.join(replica.facts)}."]
+        _print_answer(out, facts, replica, replica.table, "Recording and replica")
     write_json(json_out, answer.model_dump(mode="json"))
     if params_out is not None:
-        _write_parameters(params_out, answer.tuning)
+        _write_parameters(params_out, tuning)
 
 
-def _print_tuning(out: Console, answer: TuningAnswer | Refusal) -> None:
-    if isinstance(answer, Refusal):
-        _print_refusal(out, "No gains", answer)
-        return
-    out.print(escape(f"Flight: {', '.join(answer.flight)}."))
-    out.print(escape(f"Vehicle: {', '.join(answer.vehicle)}."))
-    _print_table(out, answer.gains, "This flight with other gains", answer.notes)
-    out.print(escape(answer.answer))
-
-
-def _print_replica(out: Console, answer: ReplicaAnswer | Refusal) -> None:
-    if isinstance(answer, Refusal):
-        _print_refusal(out, "Not compared with the replica of the controller", answer)
-        return
-    out.print(escape(f"Replica of the controller: {', '.join(answer.facts)}."))
-    _print_table(out, answer.table, "Recording and replica", answer.notes)
-    out.print(escape(answer.answer))
-
-
-def _print_table(out: Console, cells: TextTable, title: str, notes: Sequence[str]) -> None:
+def _print_answer(
+    out: Console, facts: Sequence[str], answer: TuningAnswer | ReplicaAnswer, cells: TextTable, title: str
+) -> None:
+    for fact in facts:
+        out.print(escape(fact))
     out.print(table(cells.columns, cells.rows, title=title))
-    for note in notes:
+    for note in answer.notes:
         out.print(escape(note), style="dim")
+    out.print(escape(answer.answer))
 
 
 def _print_refusal(out: Console, what: str, why: Refusal) -> None:

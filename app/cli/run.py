@@ -38,8 +38,7 @@ from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.registration import register_vehicle
 from app.fleet.schemas import NewVehicle, VehicleChoice
-from app.flights.direct_flight import DirectFlight
-from app.flights.runner import FlightRunner
+from app.flights.runner import DirectFlight, FlightRunner
 from app.flights.service import fly_new_trial
 from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry
@@ -68,11 +67,10 @@ def run_campaign(file: CampaignFile, *, json_out: Path | None, data_dir: Path, o
 
     def report(stopped_because: str) -> None:
         _print(out, file, experiment, display, stopped_because)
-        _print_held(out, file, display)
         write_json(json_out, _document(file, definition, options, display, stopped_because))
 
     try:
-        with display, _logs_to_stderr(), _temporary_database() as database:
+        with display.progress, _logs_to_stderr(), _temporary_database() as database:
             stopped_because = _Campaign(database, file, experiment, display, folder).fly(
                 given, overrule, max_flights=definition.stop.max_flights
             )
@@ -230,7 +228,7 @@ class _Display:
     """
 
     def __init__(self, definition: Definition, experiment: Experiment) -> None:
-        self._progress = Progress(
+        self.progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
             BarColumn(),
@@ -238,7 +236,7 @@ class _Display:
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self._progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
+        self._task = self.progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
         self._output_unit = CHANNEL_UNITS[experiment.output]
@@ -247,18 +245,11 @@ class _Display:
         self.touched = False
         self.held: Mapping[str, float] | None = None
 
-    def __enter__(self) -> "_Display":
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
     def hold(self, gains: Mapping[str, float] | None) -> None:
         self.touched, self.held = True, gains
 
     def planned(self, number: int, gains: Gains) -> None:
-        self._progress.update(
+        self.progress.update(
             self._task,
             completed=0.0,
             note="",
@@ -268,19 +259,20 @@ class _Display:
     def hear(self, message: PublishedMessage) -> None:
         match message:
             case Telemetry(samples=[*_, [time_s, output, *_]]):
-                self._progress.update(self._task, completed=time_s, note=f"{output:.2f} {self._output_unit}")
+                self.progress.update(self._task, completed=time_s, note=f"{output:.2f} {self._output_unit}")
             case FlightPhase(note=note) if note:
-                self._progress.update(self._task, note=note)
+                self.progress.update(self._task, note=note)
 
     def landed(self, trial: TrialRow, kind: str) -> None:
         self.trials.append(trial)
         self.kinds.append(kind)
-        self._progress.console.print(
-            f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
+        error = "no error" if trial.error is None else f"{trial.error:.4f} {self._unit}"
+        self.progress.console.print(
+            f"flight {trial.number}: {format_gains(trial.gains)} → {error} "
             f"({trial.state}{f': {reason}' if (reason := reason_of(trial)) else ''})",
             highlight=False,
         )
-        self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
+        self.progress.update(self._task, description="computing the next gains", completed=0.0, note="")
 
 
 def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _Display, stopped_because: str) -> None:
@@ -307,13 +299,9 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
         out.print(f"Gate overruled: {named_flights(overruled)}.")
     out.print(f"Stopped: {stopped_because}")
     if best is not None:
-        out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")
-
-
-def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
-    """Print the gains on a vehicle with a link; any other vehicle is a new one for each flight."""
+        out.print(f"Best: {best.error:.4f} {unit} with {format_gains(best.gains)}, flight {best.number}.")
     if not get_kind(file.vehicle.kind).is_real:
-        return
+        return  # a new vehicle for each flight
     if display.held is not None:
         out.print(f"The safe gains are restored and read back: {format_gains(display.held)}.")
     elif display.touched:
@@ -358,7 +346,3 @@ def _prediction(trial: TrialRow, trials: Sequence[TrialRow]) -> tuple[float | No
     return history.told_prediction(
         trial.predicted_error, trial.predicted_interval, corrected=history.is_corrected(trials, trial.number)
     )
-
-
-def _error(value: float | None, unit: str) -> str:
-    return "no error" if value is None else f"{value:.4f} {unit}"

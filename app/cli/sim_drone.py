@@ -3,7 +3,6 @@
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from types import FrameType
 
 from app.autopilots.simulated_kinds import SIMULATED
 from app.cli.console import console
@@ -102,10 +101,7 @@ def _options(settings: Sequence[str]) -> dict[str, float]:
 
 @contextmanager
 def _stopped_by_signals(server: Server) -> Iterator[None]:
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        server.stop()
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, lambda *_: server.stop()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:

@@ -11,20 +11,16 @@ from app.accounts.permissions import Key
 from app.common.errors import UnavailableError
 from app.common.settings import Settings
 from app.processes.locks import signature
-from app.web.addresses import unlock_link
+from app.web.addresses import AddressInfo, unlock_link
 
 _ANSWERS_WITHIN_S = 5.0
-
-
-class _Address(BaseModel):
-    url: str
 
 
 class _System(BaseModel):
     """The fields of GET /api/system that are used here."""
 
     is_exposed: bool
-    addresses: list[_Address]
+    addresses: list[AddressInfo]
 
 
 def unlock(settings: Settings, *, script: bool) -> None:

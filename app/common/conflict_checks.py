@@ -2,54 +2,49 @@
 
 from collections.abc import Iterable, Mapping, Set
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Final, TypeVar
 
 from app.common.errors import ConflictError, Problem
 
 S = TypeVar("S", bound=StrEnum)
 
-_LABELS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "captured": "waiting for review",
-        "deciding": "between flights",
-        "draft": "in preparation",
-        "flying": "in flight",
-    }
-)
+_LABELS: Final[Mapping[str, str]] = {
+    "captured": "waiting for review",
+    "deciding": "between flights",
+    "draft": "in preparation",
+    "flying": "in flight",
+}
 """States that a person knows by another word."""
 
-_REFUSALS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "abort": "cannot be aborted",
-        "archive": "cannot be archived",
-        "cancel": "cannot be cancelled",
-        "check": "cannot be checked",
-        "classify": "cannot be reviewed",
-        "connect": "cannot be connected",
-        "define": "cannot be changed",
-        "delete": "cannot be deleted",
-        "disconnect": "cannot be disconnected",
-        "edit": "cannot be edited",
-        "finish": "cannot be ended",
-        "fly": "cannot be flown",
-        "judge": "cannot be reviewed",
-        "judge abort": "has no abort to review",
-        "land": "cannot be commanded to land",
-        "motors off": "cannot be commanded to stop its motors",
-        "parameters": "cannot be asked for its parameters",
-        "plan": "cannot have another flight planned",
-        "propose": "cannot get a proposal",
-        "release": "cannot be released",
-        "reopen": "cannot be reopened",
-        "restore": "cannot be sent its safe gains",
-        "retry": "cannot be retried",
-        "stage": "cannot be staged",
-        "take-off": "cannot take off",
-        "unstage": "cannot be unstaged",
-        "upload": "cannot accept a record",
-    }
-)
+_REFUSALS: Final[Mapping[str, str]] = {
+    "abort": "cannot be aborted",
+    "archive": "cannot be archived",
+    "cancel": "cannot be cancelled",
+    "check": "cannot be checked",
+    "classify": "cannot be reviewed",
+    "connect": "cannot be connected",
+    "define": "cannot be changed",
+    "delete": "cannot be deleted",
+    "disconnect": "cannot be disconnected",
+    "edit": "cannot be edited",
+    "finish": "cannot be ended",
+    "fly": "cannot be flown",
+    "judge": "cannot be reviewed",
+    "judge abort": "has no abort to review",
+    "land": "cannot be commanded to land",
+    "motors off": "cannot be commanded to stop its motors",
+    "parameters": "cannot be asked for its parameters",
+    "plan": "cannot have another flight planned",
+    "propose": "cannot get a proposal",
+    "release": "cannot be released",
+    "reopen": "cannot be reopened",
+    "restore": "cannot be sent its safe gains",
+    "retry": "cannot be retried",
+    "stage": "cannot be staged",
+    "take-off": "cannot take off",
+    "unstage": "cannot be unstaged",
+    "upload": "cannot accept a record",
+}
 
 
 def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:

@@ -9,6 +9,7 @@ GainlineError                 (app.core.errors)
 │   ├── TooLargeError         more bytes than the program accepts
 │   └── MediaTypeError        a type of content that is not accepted
 ├── NotAllowedError           not permitted from there, or not for this caller
+│   └── ForeignRequestError   from a page of another site, or under a foreign host name
 ├── NotFoundError             there is no such object
 ├── ConflictError             not possible now: the state or the version forbids it
 │   └── BusyError             the vehicle has a flight or an act under way
@@ -26,6 +27,7 @@ __all__ = [
     "AlreadyRunningError",
     "BusyError",
     "ConflictError",
+    "ForeignRequestError",
     "GainlineError",
     "GainsError",
     "InputError",
@@ -61,6 +63,10 @@ class MediaTypeError(InputError):
 
 class NotAllowedError(GainlineError):
     """The request is possible, but not from where it was sent, or not for its caller."""
+
+
+class ForeignRequestError(NotAllowedError):
+    """The request came from a page of another site, or under a host name that is not this server's."""
 
 
 class NotFoundError(GainlineError):

@@ -4,9 +4,9 @@
                      └ with the outcome, in the same transaction: record_disconnected, quarantine_vehicle,
                        record_released, record_checks; of a connect by finish_connect instead
 
-Land and motors off bypass the database; `record_command` records them afterwards. At a worker's start: `withdraw_acts`,
-then `forget_connections`, then `request_reconnections`. Later, `list_vehicles_to_reconnect` lists those that are not
-connected yet, until `record_reconnected`.
+Land and motors off bypass the database; `record_command` records them afterwards. At a worker's start: `recover`, then
+`request_reconnections`. Later, `list_vehicles_to_reconnect` lists those that are not connected yet, until
+`record_reconnected`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,7 +33,7 @@ from app.fleet.service import (
     settings_of,
     vehicle_view,
 )
-from app.vehicles.base import CheckItem, Identity, LinkedVehicle
+from app.vehicles.base import CheckItem, ConnectionOpened, Identity, LinkedVehicle
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
@@ -166,28 +166,22 @@ def finish_act(
     _end(act, problem=problem, still_wanted=act.vehicle.identity is not None)
 
 
-def finish_connect(
-    session: Session, task: ActTask, identity: Identity, *, concern: str = "", held: Mapping[str, float] | None = None
-) -> None:
+def finish_connect(session: Session, task: ActTask, opened: ConnectionOpened) -> None:
     """Record an open link as `record_connected`, and the outcome of its act.
 
-    In this order: connecting wrote gains only to a vehicle that was pinned before. The act keeps the `concern` as its
+    In this order: connecting wrote gains only to a vehicle that was pinned before. The act keeps the concern as its
     reason.
     """
-    finish_act(session, task.act_id, read_back=held)
-    repository.get_act(session, task.act_id).reason = concern
-    record_connected(session, task.vehicle.vehicle_id, identity, concern=concern, held=held)
+    finish_act(session, task.act_id, read_back=opened.held or None)
+    repository.get_act(session, task.act_id).reason = opened.concern
+    record_connected(session, task.vehicle.vehicle_id, opened)
 
 
-def withdraw_acts(session: Session) -> None:
-    """End all requested and running acts at a worker's start; they are not carried out later."""
+def recover(session: Session) -> None:
+    """End all requested and running acts at a worker's start; they are not carried out later. No link is open then:
+    set ready vehicles to disconnected; a quarantined vehicle stays quarantined."""
     for act in repository.acts_under_way(session):
         _end(act, problem=f"{_WITHDRAWN[act.state]} Request it again if it is still needed.")
-
-
-def forget_connections(session: Session) -> None:
-    """Set ready vehicles to disconnected at a worker's start, when no link is open; a quarantined vehicle stays
-    quarantined."""
     for row in repository.registered_in(session, VehicleState.READY):
         set_vehicle_state(row, VehicleState.DISCONNECTED)
 
@@ -209,9 +203,7 @@ def _wanted(session: Session) -> list[VehicleRow]:
     return [row for row in rows if row.wanted_connected and repository.act_under_way(session, row.id) is None]
 
 
-def record_reconnected(
-    session: Session, vehicle_id: int, identity: Identity, *, concern: str, held: Mapping[str, float]
-) -> bool:
+def record_reconnected(session: Session, vehicle_id: int, opened: ConnectionOpened) -> bool:
     """Record that a vehicle was reconnected without a request.
 
     Returns False, and leaves the vehicle disconnected, if it is no longer wanted connected or was deleted.
@@ -219,44 +211,38 @@ def record_reconnected(
     row = session.get(VehicleRow, vehicle_id)
     if row is None or not row.wanted_connected:
         return False
-    read_back = dict(held) or None
+    read_back = dict(opened.held) or None
     given = dict(row.safe_gains) if _was_given(row, read_back) else None
-    record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
-    act = record_act(
-        session, row, ActKind.CONNECT, by=BY_WORKER, reason=concern or "it is reachable again", asked=given
-    )
+    record_connected(session, vehicle_id, opened)
+    reason = opened.concern or "it is reachable again"
+    act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason=reason, asked=given)
     act.read_back = read_back
     return True
 
 
-def record_connected(
-    session: Session,
-    vehicle_id: int,
-    identity: Identity,
-    *,
-    concern: str = "",
-    held: Mapping[str, float] | None = None,
-) -> None:
-    """Record an open link. The vehicle is ready, or quarantined when there is a `concern`, old or new.
+def record_connected(session: Session, vehicle_id: int, opened: ConnectionOpened) -> None:
+    """Record an open link. The vehicle is ready, or quarantined when there is a concern, old or new.
 
     Its identity is pinned at the first connection without a concern; version and hardware id are added when it first
     reports them. No gains are written to a vehicle that is not pinned, because no person has decided yet about the
-    gains that it was found with. `held`: its gains, where it reported them. The last preflight check says nothing of
-    the vehicle that answers now.
+    gains that it was found with. The last preflight check says nothing of the vehicle that answers now.
     """
     row = repository.get_one(session, vehicle_id)
-    known = concern or row.concern
+    known = opened.concern or row.concern
     row.checks = row.checked_at = None
-    if not concern:
-        _pin(row, identity)
-    if held is not None:
-        hold_gains(row, held)
+    if not opened.concern:
+        pin_identity(session, vehicle_id, opened.identity)
+    if opened.held:
+        hold_gains(row, opened.held)
     _move_to(row, VehicleState.QUARANTINED if known else VehicleState.READY, known)
 
 
 def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
-    """Pin the identity, or add what was not known of it; some autopilots report all of it only after a while."""
-    _pin(repository.get_one(session, vehicle_id), identity)
+    """Pin the identity: what is pinned stays; what was missing is added, because some autopilots report all of it only
+    after a while."""
+    row = repository.get_one(session, vehicle_id)
+    pinned = _pinned(row)
+    row.identity = asdict(identity if pinned is None else pinned.completed_by(identity))
 
 
 def record_disconnected(session: Session, vehicle_id: int, *, concern: str = "") -> None:
@@ -315,12 +301,6 @@ def _was_given(row: VehicleRow, read_back: Mapping[str, float] | None) -> bool:
 
 def _pinned(row: VehicleRow) -> Identity | None:
     return None if row.identity is None else Identity(**row.identity)
-
-
-def _pin(row: VehicleRow, identity: Identity) -> None:
-    """Pin an identity: what is pinned stays; what was missing is added."""
-    pinned = _pinned(row)
-    row.identity = asdict(identity if pinned is None else pinned.completed_by(identity))
 
 
 def _move_to(row: VehicleRow, state: VehicleState, concern: str) -> None:

@@ -285,17 +285,20 @@ def _require_free(session: Session, name: str, *, unless: int | None = None) -> 
 
 
 def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
-    problems = []
-    if not new.safe_gains_confirmed:
-        problems.append(Problem("safe_gains_confirmed", "must be confirmed by the person who verified the safe gains"))
-    if not new.statement.strip():
-        problems.append(Problem("statement", "must state who verified them, and how"))
-    if problems:
+    required = (
+        (
+            new.safe_gains_confirmed,
+            "safe_gains_confirmed",
+            "must be confirmed by the person who verified the safe gains",
+        ),
+        (new.statement.strip(), "statement", "must state who verified them, and how"),
+    )
+    if problems := tuple(Problem(field, reason) for is_given, field, reason in required if not is_given):
         raise UnconfirmedError(
             f"{new.name} is a real vehicle, and each of its flights ends with "
             f"{format_gains(gains, EXACT_DIGITS)}. A person must review these gains first.",
             hint="Compare them with gains that fly well on this vehicle, then confirm them and give your name.",
-            problems=tuple(problems),
+            problems=problems,
         )
 
 

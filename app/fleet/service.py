@@ -6,7 +6,6 @@ asked of a vehicle in `views`.
 
 from collections.abc import Mapping
 from datetime import datetime
-from types import MappingProxyType
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -26,8 +25,6 @@ from app.fleet.control import control_of
 from app.fleet.schemas import CampaignVehicle, Vehicle, VehicleChoice
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
-
-_OF_SHARED: Final = frozenset({"fly", "release"})
 
 
 def can_fly(row: VehicleRow) -> bool:
@@ -184,18 +181,16 @@ def require_window_fits(row: VehicleRow, window_s: float) -> None:
         )
 
 
-_ACTS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        ActKind.CONNECT: "it is being connected",
-        ActKind.DISCONNECT: "it is being disconnected",
-        ActKind.CHECK: "its gains are being checked",
-        ActKind.RESTORE: "its safe gains are being restored",
-        ActKind.PARAMETERS: "its parameters are being read",
-        ActKind.RELEASE: "it is being released",
-        ActKind.LAND: "it is being commanded to land",
-        ActKind.MOTORS_OFF: "its motors are being commanded to stop",
-    }
-)
+_ACTS: Final[Mapping[str, str]] = {
+    ActKind.CONNECT: "it is being connected",
+    ActKind.DISCONNECT: "it is being disconnected",
+    ActKind.CHECK: "its gains are being checked",
+    ActKind.RESTORE: "its safe gains are being restored",
+    ActKind.PARAMETERS: "its parameters are being read",
+    ActKind.RELEASE: "it is being released",
+    ActKind.LAND: "it is being commanded to land",
+    ActKind.MOTORS_OFF: "its motors are being commanded to stop",
+}
 
 
 def require_idle(session: Session, row: VehicleRow) -> None:
@@ -246,17 +241,18 @@ def is_linked_or_wanted(row: VehicleRow) -> bool:
 
 
 def _actions(row: VehicleRow) -> list[str]:
-    possible = allowed(VEHICLE_ACTIONS, row.state)
-    if not row.registered:
-        possible = [action for action in possible if action in _OF_SHARED]
-    impossible = set() if can_fly(row) else {"fly", "stage"}
-    if needs_staging(row):
-        impossible.add("fly")
-    if not is_linked_or_wanted(row):
-        impossible.add("disconnect")
-    if is_linked_or_wanted(row) or row.concern:
-        impossible |= {"configure", "delete"}
-    return [action for action in possible if action not in impossible]
+    is_linked = is_linked_or_wanted(row)
+    return allowed(
+        VEHICLE_ACTIONS,
+        row.state,
+        (
+            (not row.registered, VEHICLE_ACTIONS.keys() - {"fly", "release"}),
+            (not can_fly(row), {"fly", "stage"}),
+            (needs_staging(row), {"fly"}),
+            (not is_linked, {"disconnect"}),
+            (is_linked or row.concern, {"configure", "delete"}),
+        ),
+    )
 
 
 def vehicle_view(row: VehicleRow) -> Vehicle:

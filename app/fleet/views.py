@@ -28,12 +28,9 @@ _NEWEST_FIRST: Final = Order("-at", FlightRow.requested_at.expression, descendin
 
 def _act_view(row: VehicleActRow, flight: FlightRow | None) -> VehicleAct:
     """The act; with the flight that it is a command of, its outcome follows from that of the flight."""
-    act = VehicleAct.view_of(row)
-    if flight is None:
-        return act
-    state, problem = _command_outcome(row.kind, flight)
-    finished_at = None if state in ACTIVE_ACT_STATES else act.finished_at
-    return act.model_copy(update={"state": state, "problem": problem, "finished_at": finished_at})
+    state, problem = (row.state, row.problem) if flight is None else _command_outcome(row.kind, flight)
+    finished_at = None if state in ACTIVE_ACT_STATES else row.finished_at
+    return VehicleAct.view_of(row, state=state, problem=problem, finished_at=finished_at)
 
 
 def _command_outcome(kind: ActKind, flight: FlightRow) -> tuple[ActState, str]:

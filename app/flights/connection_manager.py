@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 import structlog
 from sqlalchemy.orm import Session as Transaction
 
-from app.common.errors import ConflictError, GainlineError, StorageError
+from app.common.errors import ConflictError, GainlineError
 from app.common.logging import say
 from app.common.states import GIVES_GAINS, ActKind
 from app.fleet import commands
@@ -23,7 +23,6 @@ from app.flights.connection_process import run_connection_process
 from app.flights.flight_process import RECONNECT_INTERVAL_S, VehicleConnection
 from app.flights.process_messages import (
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     VehicleResponse,
     status_time,
@@ -31,7 +30,7 @@ from app.flights.process_messages import (
 from app.flights.service import record_abort
 from app.flights.worker_part import WorkerPart
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
-from app.vehicles.base import LinkedVehicle, SafeGainsError, VehicleError
+from app.vehicles.base import ConnectionOpened, LinkedVehicle, SafeGainsError, VehicleError
 from app.vehicles.flight_end import REQUESTED_BY_OPERATOR, StopRequest
 
 T = TypeVar("T")
@@ -75,8 +74,7 @@ class VehicleConnectionManager:
         Raises StorageError.
         """
         with self._part.database.write() as transaction:
-            commands.withdraw_acts(transaction)
-            commands.forget_connections(transaction)
+            commands.recover(transaction)
             wanted = commands.request_reconnections(transaction) if self._links else []
         if wanted:
             say(f"Vehicles to connect to again: {len(wanted)}")
@@ -153,10 +151,7 @@ class VehicleConnectionManager:
                 also=lambda t: commands.record_disconnected(t, task.vehicle.vehicle_id, concern=concern),
             )
             return
-        held = opened.held or None
-        self._store_with_retry(
-            lambda t: commands.finish_connect(t, task, opened.identity, concern=opened.concern, held=held)
-        )
+        self._store_with_retry(lambda t: commands.finish_connect(t, task, opened))
 
     def _disconnect(self, task: ActTask) -> None:
         self._close(task.vehicle.vehicle_id)
@@ -251,11 +246,7 @@ class VehicleConnectionManager:
             return
         finally:
             slot.busy.release()
-        kept = self._store_with_retry(
-            lambda t: commands.record_reconnected(
-                t, vehicle.vehicle_id, opened.identity, concern=opened.concern, held=opened.held
-            )
-        )
+        kept = self._store_with_retry(lambda t: commands.record_reconnected(t, vehicle.vehicle_id, opened))
         if kept is False:
             self._close(vehicle.vehicle_id, only=found)
 
@@ -328,11 +319,10 @@ class VehicleConnectionManager:
         """Result of `work`, retried until the database accepts it; None if the database refuses it or the worker
         closes."""
 
-        def refused(error: StorageError) -> None:
-            _log.error("vehicle state not stored yet", why=str(error))
-
         try:
-            return self._part.store_with_retry(work, refused)
+            return self._part.store_with_retry(
+                work, lambda error: _log.error("vehicle state not stored yet", why=str(error))
+            )
         except GainlineError as error:
             _log.error("vehicle state conflicts with the database", why=str(error))
             return None

@@ -24,14 +24,12 @@ from app.flights.flight_loop import (
 from app.flights.flight_process import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S
 from app.flights.process_messages import (
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     FlightMessage,
     FlightRequest,
     SafeGainsRestored,
     Staging,
     StagingLost,
-    TakeOffCommand,
     ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
@@ -43,6 +41,7 @@ from app.live.messages import SILENT_AFTER_S, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
     ConnectedVehicle,
+    ConnectionOpened,
     InterruptedByOrderError,
     SafeGainsError,
     Vehicle,
@@ -130,9 +129,12 @@ class VehicleProcess(FlightLoop):
     # ---- between flights
 
     def _open_vehicle(self) -> ConnectedVehicle:
+        it, folder = self._call.vehicle, trial_parameters_folder(self._call.data_dir)
+        connect = get_kind(it.kind).connect
+        assert connect is not None, it.kind
         while True:
             try:
-                return self._connect()
+                return connect(it.options, it.safe_gains, folder, it.identity, self._while_waiting, it.was_flying)
             except VehicleError as error:
                 if not self._call.keep_retrying or isinstance(error, SafeGainsError):
                     raise
@@ -140,32 +142,29 @@ class VehicleProcess(FlightLoop):
                 self._line.receive()
                 self._clock.wait_s(POLL_INTERVAL_S)
 
-    def _connect(self) -> ConnectedVehicle:
-        it, folder = self._call.vehicle, trial_parameters_folder(self._call.data_dir)
-        connect = get_kind(it.kind).connect
-        assert connect is not None, it.kind
-        return connect(it.options, it.safe_gains, folder, it.identity, self._while_waiting, it.was_flying)
-
     def _next(self) -> ToVehicleProcess:
-        """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
-        while (message := self._poll_commands()) is None:
+        """Return the worker's next message that is not a command; forward commands at once, and attend to the vehicle
+        meanwhile."""
+        while (message := self._line.receive()) is None or isinstance(message, VehicleCommand):
+            if message is not None:
+                self._forward_command(message)
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             if (status := self._publish_status()) is not None and self._staging in {"staged", "silent"}:
                 self._watch_staged(status)
         return message
 
-    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
+    def _await_takeoff_clearance(self) -> float | None:
         """Wait for the worker's decision while the staged vehicle is watched. Raises VehicleError if it is to take off
         without its staged gains."""
         self._staging = "staged"
         try:
-            cleared = super()._await_takeoff_clearance()
-            is_in_time = cleared is not None and time.monotonic() <= cleared.by_s
+            by_s = super()._await_takeoff_clearance()
+            is_in_time = by_s is not None and time.monotonic() <= by_s
             if is_in_time and (problem := _NOT_READY.get(self._staging)):
                 raise _not_flown(f"The flight was not started: {problem}.", "Stage it again.")
         finally:
             self._staging = "none"
-        return cleared
+        return by_s
 
     def _watch_staged(self, status: VehicleStatus) -> None:
         """After a silence, a restart or a gap in its positions, read the staged gains again; tell the worker if they
@@ -180,14 +179,6 @@ class VehicleProcess(FlightLoop):
             except VehicleError as error:
                 self._staging = "lost"
                 self._line.send(StagingLost(str(error)))
-
-    def _poll_commands(self) -> ToVehicleProcess | None:
-        """Forward a command at once; return any other message."""
-        message = self._line.receive()
-        if not isinstance(message, VehicleCommand):
-            return message
-        self._forward_command(message)
-        return None
 
     def _while_waiting(self) -> None:
         """Callback of slow operations on the ground: forwards a command at once, which interrupts the operation.
@@ -262,7 +253,7 @@ class VehicleProcess(FlightLoop):
     # ---- acts
 
     def _act(self, asked: VehicleRequest) -> VehicleResponse:
-        checks, parameters = None, None
+        checks, parameters, identity, problem = None, None, None, ""
         try:
             if self._vehicle.condition().armed:  # a slow operation would delay Land
                 raise VehicleError(
@@ -283,14 +274,16 @@ class VehicleProcess(FlightLoop):
                         raise VehicleError(
                             f"A vehicle connection cannot execute “{kind}”.", hint="Report this with the worker's log."
                         )
+            identity = self._vehicle.identity
         except VehicleError as error:
-            return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
+            problem = str(error)
         return VehicleResponse(
+            problem=problem,
             concern=self._vehicle.concern,
             held=self._held(),
             checks=checks,
             parameters=parameters,
-            identity=self._vehicle.identity,
+            identity=identity,
         )
 
     def _require_safe_gains(self, safe_gains: Mapping[str, float]) -> None:
@@ -325,11 +318,11 @@ class VehicleProcess(FlightLoop):
                 "Check that this computer is not overloaded, then request the flight again.",
             )
 
-    def _take_off(self, vehicle: Vehicle, request: FlightRequest, cleared: TakeOffCommand) -> Generator[FlightMessage]:
+    def _take_off(self, vehicle: Vehicle, request: FlightRequest, by_s: float) -> Generator[FlightMessage]:
         with self._interruptible():
-            self._take_off_by_s = cleared.by_s
+            self._take_off_by_s = by_s
             self._require_in_time()
-            yield from super()._take_off(vehicle, request, cleared)
+            yield from super()._take_off(vehicle, request, by_s)
 
     def _should_stop(self) -> StopRequest | None:
         self._require_in_time()

@@ -22,7 +22,6 @@ from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.flights.process_messages import (
     CancelFlight,
-    CancelTakeOff,
     FlightFailure,
     FlightFinished,
     FlightLanded,
@@ -30,7 +29,7 @@ from app.flights.process_messages import (
     FlightRequest,
     FromVehicleProcess,
     GainsStaged,
-    TakeOffCommand,
+    TakeOffDecision,
     ToVehicleProcess,
     VehicleCommand,
 )
@@ -129,8 +128,8 @@ class FlightExecution(ABC):
                 with self._interruptible():
                     read_back = vehicle.stage(request.gains)
                 yield GainsStaged(read_back)
-                if (cleared := self._await_takeoff_clearance()) is not None:
-                    yield from self._take_off(vehicle, request, cleared)
+                if (by_s := self._await_takeoff_clearance()) is not None:
+                    yield from self._take_off(vehicle, request, by_s)
         except PipeClosedError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
@@ -143,13 +142,13 @@ class FlightExecution(ABC):
         """Context that a command for the vehicle interrupts; a simulation gets none."""
         return nullcontext()
 
-    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
-        """Wait for the runner's decision. Raises PipeClosedError."""
-        while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
+    def _await_takeoff_clearance(self) -> float | None:
+        """Wait for the runner's decision: by when to take off, None for not at all. Raises PipeClosedError."""
+        while not isinstance(answer := self._next(), TakeOffDecision):
             self._note(answer)
-        return answer if isinstance(answer, TakeOffCommand) else None
+        return answer.by_s
 
-    def _take_off(self, vehicle: Vehicle, request: FlightRequest, _cleared: TakeOffCommand) -> Generator[FlightMessage]:
+    def _take_off(self, vehicle: Vehicle, request: FlightRequest, _by_s: float) -> Generator[FlightMessage]:
         monitor = FlightMonitor(request, self._show, self._clock)
         yield FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase="flying")
         record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=self._should_stop)

@@ -29,9 +29,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.flights.flight_loop import run_simulations
 from app.flights.process_messages import (
     CancelFlight,
-    CancelTakeOff,
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     FlightFailure,
     FlightFinished,
@@ -39,7 +37,7 @@ from app.flights.process_messages import (
     FlightRequest,
     FromVehicleProcess,
     StagingLost,
-    TakeOffCommand,
+    TakeOffDecision,
     ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
@@ -48,7 +46,7 @@ from app.flights.process_messages import (
 )
 from app.live.messages import NO_LINK, SILENT_AFTER_S, VehicleCommandKind, VehicleStatus
 from app.processes import ChildProcess, ProcessDiedError
-from app.vehicles.base import SafeGainsError, VehicleError
+from app.vehicles.base import ConnectionOpened, SafeGainsError, VehicleError
 from app.vehicles.flight_end import StopRequest
 
 NOT_ANSWERING: Final = (
@@ -85,7 +83,7 @@ class FlightProcess:
     def fly(self, request: FlightRequest) -> Generator[FlightMessage]:
         """Send the request, and yield the messages until the process is free again.
 
-        The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
+        The caller answers GainsStaged by `decide`. Raises VehicleError when the process dies.
         """
         self.trial_id, self.staging_lost = request.trial_id, ""
         try:
@@ -96,11 +94,8 @@ class FlightProcess:
         finally:
             self.trial_id = None
 
-    def take_off(self) -> None:
-        self._post(TakeOffCommand(by_s=time.monotonic() + self._take_off_timeout_s))
-
-    def cancel_take_off(self) -> None:
-        self._post(CancelTakeOff())
+    def decide(self, takes_off: bool) -> None:
+        self._post(TakeOffDecision(time.monotonic() + self._take_off_timeout_s if takes_off else None))
 
     def cancel_flight(self, trial_id: int, request: StopRequest) -> None:
         """End that flight now; a vehicle that has not taken off stays on the ground."""

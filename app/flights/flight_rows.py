@@ -208,28 +208,22 @@ def clearance_of(session: Session, flight_id: int) -> tuple[bool, FlightOutcome 
 
 
 def _clearance(flight: FlightRow) -> tuple[bool, FlightOutcome | None]:
-    if flight.state == FlightState.RUNNING and flight.stand_down:
+    if flight.state != FlightState.RUNNING:
+        why = f"the flight is {flight.state}"
+    elif flight.stand_down:
         end = FlightEnd(request=StopRequest(by=Requester(flight.stand_down)), landed=Landing.STAYED)
         return False, FlightOutcome(withdrawn=True, end=end)
-    if why := _stand_down_reason(flight):
-        return False, FlightOutcome(withdrawn=True, problem=why)
-    return _may_take_off(flight), None
-
-
-def _stand_down_reason(flight: FlightRow) -> str:
-    if flight.state != FlightState.RUNNING:
-        return f"the flight is {flight.state}"
-    if flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
-        return f"the trial is {flight.trial.state}"
-    if flight.mode == "stage" and flight.take_off_at is not None and not _may_take_off(flight):
-        return f"the takeoff did not start within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's request"
-    return ""
-
-
-def _may_take_off(flight: FlightRow) -> bool:
-    if flight.mode == "fly":
-        return not fleet.needs_staging(flight.vehicle)
-    return flight.take_off_at is not None and utc_now() - flight.take_off_at <= REQUEST_TIMEOUT
+    elif flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
+        why = f"the trial is {flight.trial.state}"
+    elif flight.mode == "fly":
+        return not fleet.needs_staging(flight.vehicle), None
+    elif flight.take_off_at is None:
+        return False, None
+    elif utc_now() - flight.take_off_at <= REQUEST_TIMEOUT:
+        return True, None
+    else:
+        why = f"the takeoff did not start within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's request"
+    return False, FlightOutcome(withdrawn=True, problem=why)
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:
@@ -270,7 +264,9 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     end = outcome.gains_left(outcome.ended if flight.end is None else flight.end, flight.safe_gains)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
-            _land(session, flight, replace(outcome.record, end=end))
+            _capture(session, flight, replace(outcome.record, end=end))
+            _end(flight, FlightState.ABORTED if outcome.record.ending == "aborted" else FlightState.LANDED, end)
+            proposals.finish_flying(session, flight.campaign)
         elif outcome.lifted_off:
             _lose(session, flight, end)
         else:
@@ -313,12 +309,6 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
         return
     _capture(session, flight, record)
     proposals.history_changed(session, flight.campaign)
-
-
-def _land(session: Session, flight: FlightRow, record: FlightRecord) -> None:
-    _capture(session, flight, record)
-    _end(flight, FlightState.ABORTED if record.ending == "aborted" else FlightState.LANDED, record.end)
-    proposals.finish_flying(session, flight.campaign)
 
 
 def _lose(session: Session, flight: FlightRow, end: FlightEnd) -> None:

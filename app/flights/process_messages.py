@@ -1,14 +1,14 @@
 """Messages between the worker and a process that flies a vehicle, whichever kind of process that is; one of them is the
 vehicle's status, with its readiness for the flight that it waits for.
 
-    worker    FlightRequest →             → TakeOffCommand | CancelTakeOff →
+    worker    FlightRequest →             → TakeOffDecision →
     process                   GainsStaged →   Telemetry … FlightLanded → SafeGainsRestored → FlightFinished
 
 `CancelFlight` may come at any moment; `FlightFailure` takes the place of the messages that do not come.
 """
 
 import datetime as dt
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal
@@ -20,7 +20,6 @@ from app.core.experiments.base import Experiment
 from app.live.messages import (
     SILENT_AFTER_S,
     FlightPhase,
-    PublishedMessage,
     Telemetry,
     UnreadyReason,
     VehicleCommandKind,
@@ -30,6 +29,7 @@ from app.vehicles.base import (
     CheckItem,
     Condition,
     ConnectedVehicle,
+    ConnectionOpened,
     FlightOptions,
     FlightRecord,
     Identity,
@@ -74,24 +74,17 @@ class FlightRequest:
 
 @dataclass(frozen=True, slots=True)
 class GainsStaged:
-    """From the process, which then waits for TakeOffCommand or CancelTakeOff."""
+    """From the process, which then waits for TakeOffDecision."""
 
     read_back: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class TakeOffCommand:
-    """To the process: the gains are verified and the lift-off is recorded.
+class TakeOffDecision:
+    """To the process: the gains are verified and the lift-off is recorded, so take off, but not after `by_s` of this
+    computer's monotonic clock, s; None: this flight does not take place."""
 
-    Not to be carried out after `by_s` of this computer's monotonic clock, s.
-    """
-
-    by_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class CancelTakeOff:
-    """To the process: this flight does not take place."""
+    by_s: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,15 +153,6 @@ class ConnectionRequest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ConnectionOpened:
-    """From the process: the link is open; `concern` is why the vehicle may only be observed."""
-
-    identity: Identity
-    concern: str
-    held: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleRequest:
     """To the process: carry out this act, for a vehicle with these safe gains."""
 
@@ -213,9 +197,7 @@ class CommandForwarded:
 
 
 FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | StagingLost | FlightMessage
-ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
-
-Publish = Callable[[PublishedMessage], None]
+ToVehicleProcess = FlightRequest | TakeOffDecision | CancelFlight | VehicleRequest | VehicleCommand
 
 Staging = Literal["none", "staged", "silent", "lost"]
 """Of the flight that waits for its takeoff: nothing staged, the staged gains read back, a silence since then, or the

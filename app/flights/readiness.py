@@ -8,7 +8,6 @@ was taken. In flight a loss takes nothing back, but tells the operator what the 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
@@ -54,92 +53,86 @@ class LossText:
     keeps: ReadinessStep | None = "control"
 
 
-LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
-    {
-        "worker away": LossText(
-            what="The worker is not responding. No commands can be sent.",
-            way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
-            "with `gainline worker`. Then stage the flight again.",
-            way_on_planned="Gainline restarts its own worker within seconds. If the worker runs separately, start it "
-            "again with `gainline worker`.",
-            what_in_flight="The worker is not responding.",
-            way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
-            "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
-        ),
-        "not connected": LossText(
-            what="The vehicle is not connected.",
-            way_on="Connect it on its page, then stage the flight.",
-            what_in_flight="Gainline's connection to the vehicle has ended.",
-            way_on_in_flight="Use the vehicle's own remote control.",
-        ),
-        "process silent": LossText(
-            what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
-            way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
-            way_on_planned="Wait until it responds. If it does not, restart the worker.",
-            what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
-            way_on_in_flight="Use the vehicle's own remote control.",
-        ),
-        "link silent": LossText(
-            what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on="Check its power and its radio. It is ready again once its gains have been read back.",
-            way_on_planned="Check its power and its radio.",
-            what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
-            "control.",
-        ),
-        "gains unknown": LossText(
-            what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
-            way_on="Stage the flight again.",
-            way_on_planned="Select Check now on its page, or stage the flight.",
-        ),
-        "battery low": LossText(
-            what="The battery voltage is below the vehicle's minimum.",
-            way_on="Insert a charged battery, then stage the flight again.",
-            way_on_planned="Insert a charged battery, then stage the flight.",
-            keeps="staged",
-        ),
-        "checks failed": LossText(
-            what="A preflight check has failed.",
-            way_on="Unstage the flight, correct the failed item, then select Check now on the vehicle's page.",
-            way_on_planned="Correct the failed item, then select Check now on the vehicle's page.",
-            keeps="staged",
-        ),
-        "quarantined": LossText(
-            what="The vehicle is quarantined.",
-            way_on="Inspect it, then release it on its page.",
-            keeps=None,
-        ),
-        "control ended": LossText(
-            what="You are not in control of the vehicle.",
-            way_on="Take control.",
-            way_on_watching="Only its operator can start the takeoff.",
-            keeps=None,
-        ),
-        "controlled by other": LossText(
-            what="Another operator is in control of the vehicle.",
-            way_on="Only that operator can start the takeoff. To start it yourself, take over.",
-            way_on_watching="Only that operator can start the takeoff.",
-            keeps="held",
-        ),
-    }
-)
+LOSSES: Final[Mapping[LossKind, LossText]] = {
+    "worker away": LossText(
+        what="The worker is not responding. No commands can be sent.",
+        way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
+        "with `gainline worker`. Then stage the flight again.",
+        way_on_planned="Gainline restarts its own worker within seconds. If the worker runs separately, start it "
+        "again with `gainline worker`.",
+        what_in_flight="The worker is not responding.",
+        way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
+        "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
+    ),
+    "not connected": LossText(
+        what="The vehicle is not connected.",
+        way_on="Connect it on its page, then stage the flight.",
+        what_in_flight="Gainline's connection to the vehicle has ended.",
+        way_on_in_flight="Use the vehicle's own remote control.",
+    ),
+    "process silent": LossText(
+        what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
+        way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
+        way_on_planned="Wait until it responds. If it does not, restart the worker.",
+        what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
+        way_on_in_flight="Use the vehicle's own remote control.",
+    ),
+    "link silent": LossText(
+        what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
+        way_on="Check its power and its radio. It is ready again once its gains have been read back.",
+        way_on_planned="Check its power and its radio.",
+        what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
+        way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
+        "control.",
+    ),
+    "gains unknown": LossText(
+        what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
+        way_on="Stage the flight again.",
+        way_on_planned="Select Check now on its page, or stage the flight.",
+    ),
+    "battery low": LossText(
+        what="The battery voltage is below the vehicle's minimum.",
+        way_on="Insert a charged battery, then stage the flight again.",
+        way_on_planned="Insert a charged battery, then stage the flight.",
+        keeps="staged",
+    ),
+    "checks failed": LossText(
+        what="A preflight check has failed.",
+        way_on="Unstage the flight, correct the failed item, then select Check now on the vehicle's page.",
+        way_on_planned="Correct the failed item, then select Check now on the vehicle's page.",
+        keeps="staged",
+    ),
+    "quarantined": LossText(
+        what="The vehicle is quarantined.",
+        way_on="Inspect it, then release it on its page.",
+        keeps=None,
+    ),
+    "control ended": LossText(
+        what="You are not in control of the vehicle.",
+        way_on="Take control.",
+        way_on_watching="Only its operator can start the takeoff.",
+        keeps=None,
+    ),
+    "controlled by other": LossText(
+        what="Another operator is in control of the vehicle.",
+        way_on="Only that operator can start the takeoff. To start it yourself, take over.",
+        way_on_watching="Only that operator can start the takeoff.",
+        keeps="held",
+    ),
+}
 
-_REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
-    {
-        TrialState.PLANNED: "control",
-        TrialState.STAGED: "staged",
-        TrialState.FLYING: "in flight",
-        TrialState.LOST: "landed",
-        TrialState.CAPTURED: "landed",
-        TrialState.VALID: "reviewed",
-        TrialState.ABORTED: "reviewed",
-        TrialState.INVALID: "reviewed",
-        TrialState.CANCELLED: None,
-    }
-)
+_REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = {
+    TrialState.PLANNED: "control",
+    TrialState.STAGED: "staged",
+    TrialState.FLYING: "in flight",
+    TrialState.LOST: "landed",
+    TrialState.CAPTURED: "landed",
+    TrialState.VALID: "reviewed",
+    TrialState.ABORTED: "reviewed",
+    TrialState.INVALID: "reviewed",
+    TrialState.CANCELLED: None,
+}
 _IN_FLIGHT: Final = STEPS.index("in flight")
-_BEFORE_TAKEOFF: Final = frozenset({"preflight", "arm"})
-_ON_THE_GROUND: Final = frozenset({"restore", "idle"})
 _BEGINS_WITHIN_S: Final = 3.0
 """A vehicle on the ground this long after the takeoff was requested has not taken off yet; later it has landed."""
 _WITHOUT_LINK: Final = LossText(
@@ -227,7 +220,12 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Ste
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), _in_flight(kinds, texts)
+        in_flight = tuple(
+            Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
+            for kind in kinds
+            if texts[kind].what_in_flight
+        )
+        return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), in_flight
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     keeps = [texts[kind].keeps for kind in kinds]
@@ -243,9 +241,9 @@ def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessSt
     a lost link it is not known to have landed."""
     step = "" if report.status is None or not standing.has_link else report.status.step
     is_starting = step == "idle" and standing.flown_for_s < _BEGINS_WITHIN_S
-    if step in _BEFORE_TAKEOFF or is_starting:
+    if step in {"preflight", "arm"} or is_starting:
         return "held"
-    return "landed" if step in _ON_THE_GROUND and _link_loss(standing, report) is None else "in flight"
+    return "landed" if step in {"restore", "idle"} and _link_loss(standing, report) is None else "in flight"
 
 
 def require_ready(readiness: TrialReadiness) -> None:
@@ -301,11 +299,3 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     if status.state == "gone":
         return "link silent"
     return status.unready or None
-
-
-def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tuple[Loss, ...]:
-    return tuple(
-        Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
-        for kind in kinds
-        if texts[kind].what_in_flight
-    )

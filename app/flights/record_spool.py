@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from app.common.errors import StorageError
+from app.common.errors import InputError, StorageError
 from app.core.records.trajectory import Trajectory
 from app.db.base import FLIGHT_END
 from app.db.earlier_ends import landing_of, read_end
@@ -71,12 +71,12 @@ class Spool:
         return sorted(int(path.stem) for path in self.folder.glob(f"*{_FINISHED}"))
 
     def read(self, flight_id: int) -> FlightRecord:
-        """Read a record. Raises StorageError when the file is damaged."""
+        """Read a record. Raises InputError when the file is damaged or cannot be read."""
         path = self._path(flight_id, _FINISHED)
         try:
             return _unpack(path.read_bytes())
         except (OSError, ValueError, KeyError) as error:
-            raise StorageError(
+            raise InputError(
                 f"The record {path} cannot be read: {error}.",
                 hint="Keep the file for inspection; the trial stays lost until it is reviewed.",
             ) from error

@@ -4,9 +4,11 @@ A request is stored before it is sent, its outcome when it is known. Nothing wai
 landing; a record goes to the spool first, and from there into the database.
 """
 
-from collections.abc import Callable
-from contextlib import ExitStack, closing
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Final
 
 import structlog
@@ -14,32 +16,92 @@ from sqlalchemy.orm import Session
 
 from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
+from app.core.clock import REAL_TIME
 from app.db.session import RETRY_S
 from app.flights import flight_rows
-from app.flights.direct_flight import DirectFlight
+from app.flights.flight_loop import FlightExecution
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
+    CancelFlight,
     FlightFailure,
     FlightLanded,
     FlightRequest,
     GainsStaged,
     SafeGainsRestored,
+    TakeOffDecision,
+    ToVehicleProcess,
 )
 from app.flights.record_spool import Spool
 from app.flights.worker_part import AbortFlag, WorkerPart
 from app.live.messages import FlightPhase, Phase, Telemetry
-from app.vehicles.base import find_mismatch
-from app.vehicles.flight_end import end_text
-from app.vehicles.registry import get_kind
+from app.vehicles.base import SafeGainsError, Vehicle, find_mismatch
+from app.vehicles.flight_end import StopRequest, end_text
+from app.vehicles.registry import get_kind, open_vehicle
 
 STAGED_FOR_S: Final = 600.0
 """How long a vehicle with a trial's gains on it waits for its operator's takeoff request."""
 POLL_INTERVAL_S: Final = 0.05
 
-FlightBackend = FlightProcess | DirectFlight
-
 _log = structlog.get_logger(__name__)
+
+
+class DirectFlight(FlightExecution):
+    """What a runner without processes flies with, on its own thread: that of `gainline run`.
+
+    `show` gets the telemetry; `hold` hears the gains on the vehicle, None while they are unknown. `trial_parameters` is
+    as in `open_vehicle`. `error` is what ended the last flight, if anything did.
+    """
+
+    alive = True
+    staging_lost = ""
+
+    def __init__(
+        self,
+        show: Callable[[Telemetry], None],
+        hold: Callable[[Mapping[str, float] | None], None],
+        trial_parameters: Path | None,
+    ) -> None:
+        super().__init__(REAL_TIME, show)
+        self._hold = hold
+        self._trial_parameters = trial_parameters
+        self._answer = TakeOffDecision(None)
+        self.error: Exception | None = None
+
+    def decide(self, takes_off: bool) -> None:
+        self._answer = TakeOffDecision(math.inf if takes_off else None)
+
+    def cancel_flight(self, trial_id: int, request: StopRequest) -> None:
+        self._note(CancelFlight(trial_id, request))
+
+    def close(self) -> None:
+        """Nothing is kept open between flights."""
+
+    def _next(self) -> ToVehicleProcess:
+        return self._answer
+
+    @contextmanager
+    def _vehicle_for(self, request: FlightRequest) -> Iterator[Vehicle]:
+        self.error, is_held = None, False
+        try:
+            with open_vehicle(
+                request.vehicle_kind,
+                request.vehicle_options,
+                safe_gains=request.safe_gains,
+                trial_parameters=self._trial_parameters,
+            ) as vehicle:
+                self._hold(None)
+                is_held = True
+                yield vehicle
+        except Exception as error:
+            self.error, is_held = error, is_held and not isinstance(error, SafeGainsError)
+            raise
+        finally:
+            if is_held:
+                self._hold(request.safe_gains)
+
+
+FlightBackend = FlightProcess | DirectFlight
 
 
 class FlightRunner:
@@ -168,10 +230,7 @@ class FlightRunner:
             ended = FlightOutcome(
                 problem=f"The flight was not started, because its start could not be recorded: {error}"
             )
-        if ended.lifted_off:
-            backend.take_off()
-        else:
-            backend.cancel_take_off()
+        backend.decide(ended.lifted_off)
         return ended
 
     def _await_takeoff_clearance(
@@ -254,22 +313,15 @@ class FlightRunner:
         """Move a record from the spool into the database; set a damaged or refused one aside. Raises StorageError."""
         try:
             record = self._spool.read(flight_id)
-        except StorageError as error:
-            self._set_record_aside(flight_id, error)
-            return
-        try:
             self._part.store(lambda session: flight_rows.recover_record(session, flight_id, record))
         except StorageError:
             raise
         except GainlineError as error:
-            self._set_record_aside(flight_id, error)
+            kept_as = self._spool.set_aside(flight_id)
+            _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
             return
         self._spool.delete(flight_id)
         _log.info("record of a lost flight recovered", flight_id=flight_id)
-
-    def _set_record_aside(self, flight_id: int, error: GainlineError) -> None:
-        kept_as = self._spool.set_aside(flight_id)
-        _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
 
 
 def _describe_error(error: Exception) -> str:

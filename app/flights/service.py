@@ -104,10 +104,7 @@ def _request_flight(
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
     """How far the flight of a trial has come and what takes that back, for who asks. Raises NotFoundError."""
-    return _readiness(session, history.trial_row(session, trial_id), context, report_of)
-
-
-def _readiness(session: Session, row: TrialRow, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
+    row = history.trial_row(session, trial_id)
     vehicle = row.campaign.vehicle
     flight = history.latest_flights(session, [row.id]).get(row.id)
     active = flight if flight is not None and flight.state in ACTIVE_FLIGHT_STATES else None
@@ -160,7 +157,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
     else:
         require_may_command(vehicle, context)
         by = require_not_controlled_by_other(vehicle, context)
-    require_ready(_readiness(session, row, context, report_of))
+    require_ready(trial_readiness(session, trial_id, context, report_of))
     flight.take_off_at = utc_now()
     _record_command(session, flight, ActKind.TAKE_OFF, by=by)
     return trial_view(session, row)
@@ -211,21 +208,21 @@ def withdraw_flight(session: Session, trial_id: int, words: str) -> AbortAnswer:
     """
     row = history.trial_row(session, trial_id)
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
-    if flight is not None and flight.state == FlightState.REQUESTED:
-        history.set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
-        record_abort(session, trial_id, StopRequest(words))
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
-    if flight is not None and flight.state == FlightState.RUNNING:
+    if flight is None:
+        raise ConflictError(
+            f"Flight {row.number} is {row.state}: there is no flight to abort.", hint="Reload the trial."
+        )
+    if flight.state == FlightState.RUNNING:
         raise ConflictError(
             f"Flight {row.number} is {row.state}, and the worker that flies it is not responding.",
             hint="Abort again. If a vehicle is in the air, use its own remote control now.",
         )
-    if flight is not None:
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight has already ended.")
-    raise ConflictError(
-        f"Flight {row.number} is {row.state}: there is no flight to abort.",
-        hint="Reload the trial.",
-    )
+    sentence = "The flight has already ended."
+    if flight.state == FlightState.REQUESTED:
+        history.set_flight_state(flight, FlightState.CANCELLED, end=withdrawn_by(StopRequest(words)))
+        record_abort(session, trial_id, StopRequest(words))
+        sentence = "The flight had not started; it was withdrawn."
+    return AbortAnswer(trial_id=trial_id, accepted=True, sentence=sentence)
 
 
 def _record_command(session: Session, flight: FlightRow, kind: ActKind, *, by: str, reason: str = "") -> None:

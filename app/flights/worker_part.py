@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from app.common.errors import StorageError
 from app.core.clock import REAL_TIME, Clock
 from app.db.session import Database, retry_until_stored
-from app.flights.process_messages import Publish
+from app.live.messages import PublishedMessage
 from app.vehicles.flight_end import StopRequest
 
 T = TypeVar("T")
@@ -82,7 +82,7 @@ class WorkerPart:
     database: Database
     data_dir: Path
     abort_registry: AbortRegistry
-    publish: Publish
+    publish: Callable[[PublishedMessage], None]
     worker: str
     closing: threading.Event
     clock: Clock = REAL_TIME
@@ -92,6 +92,6 @@ class WorkerPart:
         with self.database.write() as session:
             return work(session)
 
-    def store_with_retry(self, work: Callable[[Session], T], refused: Callable[[StorageError], None]) -> T | None:
+    def store_with_retry(self, work: Callable[[Session], T], refused: Callable[[StorageError], object]) -> T | None:
         """The same, retried until the database accepts it; None when the worker closes meanwhile."""
         return retry_until_stored(lambda: self.store(work), refused, closing=self.closing, clock=self.clock)

@@ -176,16 +176,12 @@ def _perform(pipe: Connection, limits: Limits, task: Callable[[], object]) -> No
     resource.setrlimit(resource.RLIMIT_CPU, (limits.processor_s, limits.processor_s + 1))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with suppress(OSError, ValueError):  # where the system has no such limit, the time limit applies
-        most = _address_space() + limits.memory_bytes
+        used_pages = int(Path("/proc/self/statm").read_text().split()[0])
+        most = used_pages * os.sysconf("SC_PAGE_SIZE") + limits.memory_bytes
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     outcome = perform(task)
     with suppress(OSError):  # the parent no longer waits
         pipe.send(outcome)
-
-
-def _address_space() -> int:
-    """Address space that the program uses already, bytes. Raises OSError where the system does not report it."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def _too_much(limits: Limits) -> InputError:

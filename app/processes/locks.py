@@ -54,7 +54,7 @@ def exclusive(
     try:
         while not _take(descriptor):
             if not keep_waiting():
-                raise LockedError(_holder(descriptor))
+                raise LockedError(signature(path))
             clock.wait_s(POLL_S)
         _sign(descriptor, "")
         yield partial(_sign, descriptor)
@@ -65,13 +65,9 @@ def exclusive(
 def signature(path: Path) -> Holder | None:
     """The present or last holder of the lock file at `path`; None if it is unknown."""
     try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except OSError:
+        return Holder(**json.loads(path.read_bytes()))
+    except (OSError, ValueError, TypeError):
         return None
-    try:
-        return _holder(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _take(descriptor: int) -> bool:
@@ -86,10 +82,3 @@ def _sign(descriptor: int, address: str) -> None:
     with suppress(OSError):  # a full disk costs only the signature, not the lock
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, json.dumps(asdict(Holder(pid=os.getpid(), address=address))).encode(), 0)
-
-
-def _holder(descriptor: int) -> Holder | None:
-    try:
-        return Holder(**json.loads(os.pread(descriptor, 4096, 0)))
-    except (ValueError, TypeError):
-        return None

@@ -182,7 +182,6 @@ class LimitedProtocol(HttpToolsProtocol):
     ) -> None:
         super().__init__(config, server_state, app_state, _loop)
         self._all = connections
-        self._own: Connection | None = None
         self._bare_bytes = self._parsed_bytes = 0
         """Received since the parser last came to the end of headers, some body, or the end of a message; and parsed of
         the present headers."""
@@ -192,20 +191,18 @@ class LimitedProtocol(HttpToolsProtocol):
         super().connection_made(transport)
         self._all.held += 1
         peer = "" if self.client is None else self.client[0].removeprefix("::ffff:")
-        own = Connection("" if is_loopback(peer) else peer, transport.abort, lambda: self.flow.read_paused)
-        if self._all.add(own):
-            self._own = own
-        else:
+        self._own = Connection("" if is_loopback(peer) else peer, transport.abort, lambda: self.flow.read_paused)
+        if not self._all.add(self._own):
+            self._refused = True
             transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._all.held -= 1
-        if self._own is not None:
-            self._all.remove(self._own)
+        self._all.remove(self._own)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        if self._own is None or self._refused:
+        if self._refused:
             return
         self._all.hear(self._own)
         self._got_on = False
@@ -237,7 +234,7 @@ class LimitedProtocol(HttpToolsProtocol):
             self.transport.abort()
         if self._refused:
             return
-        if self._own is not None and self._own.for_stopping and not self.url.partition(b"?")[0].endswith(_STOPPING):
+        if self._own.for_stopping and not self.url.partition(b"?")[0].endswith(_STOPPING):
             self._refuse(
                 HTTPStatus.SERVICE_UNAVAILABLE,
                 "This server has too many open connections; it accepts only abort, land and motors off.",
@@ -266,7 +263,7 @@ class LimitedProtocol(HttpToolsProtocol):
         super().on_response_complete()
 
     def _enter(self, phase: Phase) -> None:
-        if self._own is not None and not self._refused:
+        if not self._refused:
             self._all.enter(self._own, phase)
 
     def _refuse_long_head(self, size_bytes: int) -> None:

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
-from types import FrameType
 from typing import Final, Self
 
 import structlog
@@ -59,11 +58,10 @@ class WorkerSupervisor:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._stopping = threading.Event()
-        self._process: BaseProcess | None = None
+        self._process = self._start()
         self._thread = threading.Thread(target=self._watch, name="worker supervisor", daemon=True)
 
     def __enter__(self) -> Self:
-        self._process = self._start()
         self._thread.start()
         return self
 
@@ -71,8 +69,6 @@ class WorkerSupervisor:
         self._stopping.set()
         self._thread.join()
         process = self._process
-        if process is None:
-            return
         if process.is_alive():
             process.terminate()
         try:
@@ -95,7 +91,6 @@ class WorkerSupervisor:
         started_s = time.monotonic()
         while not self._stopping.is_set():
             process = self._process
-            assert process is not None
             process.join(0.1)
             if process.is_alive() or self._stopping.is_set():
                 continue
@@ -133,7 +128,8 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         announce(narrowed)
     with ExitStack() as stack:
         for number in (signal.SIGINT, signal.SIGTERM):
-            stack.callback(signal.signal, number, signal.signal(number, _exit))
+            # Unwinds the stack. Uvicorn handles signals while it runs, and raises them again after its shutdown.
+            stack.callback(signal.signal, number, signal.signal(number, lambda *_: sys.exit(0)))
         try:
             sign = stack.enter_context(exclusive(settings.data_dir / "server.lock"))
         except LockedError as error:
@@ -181,8 +177,3 @@ def listen(host: str, port: int) -> socket.socket:
                 problem = Problem("host", f"{host} is not an address of this computer ({error.strerror or error})")
                 hint = "Use --host 127.0.0.1 (this computer only) or one of this computer's addresses."
         raise AddressError(f"Gainline cannot listen on {host}, port {port}.", hint=hint, problems=(problem,)) from error
-
-
-def _exit(_signal: int, _frame: FrameType | None) -> None:
-    """Unwind the stack. Uvicorn handles signals while it runs, and raises them again after its shutdown."""
-    raise SystemExit(0)

@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Final
 
 import plotly  # noqa: F401, TID253
@@ -100,11 +101,9 @@ class _Server(uvicorn.Server):
             task.add_done_callback(self._arriving.discard)
 
     async def _serve_one(self, arrived: socket.socket) -> None:
+        protocol = partial(LimitedProtocol, self._connections, self.config, self.server_state, self.lifespan.state)
         with suppress(OSError):  # the client has closed it already
-            await asyncio.get_running_loop().connect_accepted_socket(self._protocol, arrived)
-
-    def _protocol(self) -> asyncio.Protocol:
-        return LimitedProtocol(self._connections, self.config, self.server_state, self.lifespan.state)
+            await asyncio.get_running_loop().connect_accepted_socket(protocol, arrived)
 
 
 def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
@@ -130,9 +129,6 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         announce(f"Gainline is ready at {address}")
         _announce_links(settings, listener.getsockname()[1], application.state.keyring, announce)
 
-    def closing() -> None:
-        application.state.live.hub.close()
-
     connections = Connections(room_for_connections(resource.getrlimit(resource.RLIMIT_NOFILE)[0]), REAL_TIME)
     config = uvicorn.Config(
         application,
@@ -144,7 +140,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         server_header=False,
         timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
     )
-    _Server(config, listener, connections, ready=ready, closing=closing).run()
+    _Server(config, listener, connections, ready=ready, closing=application.state.live.hub.close).run()
 
 
 def _load_numerics() -> None:

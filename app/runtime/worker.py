@@ -17,7 +17,6 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from types import FrameType
 from typing import Final
 
 import structlog
@@ -31,7 +30,7 @@ from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import AlreadyRunningError, StorageError
 from app.common.logging import configure_logs, say
 from app.common.settings import Settings, is_loopback
-from app.core.clock import REAL_TIME, Clock
+from app.core.clock import REAL_TIME
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import RETRY_S, Database, retry_until_stored
@@ -63,28 +62,16 @@ interpreter lock; Python's default of 5 ms adds up over several threads."""
 _log = structlog.get_logger(__name__)
 
 
-@dataclass(slots=True)
-class ShutdownRequest:
-    """Request that the worker ends: it then claims no new work, and finishes its flights."""
-
-    event: threading.Event = field(default_factory=threading.Event)
-    reason: str = ""
-
-    def set(self, reason: str) -> None:
-        self.reason = self.reason or reason
-        self.event.set()
-
-
 def run_worker(settings: Settings) -> None:
     """Run until SIGINT or SIGTERM, which also end running flights; for the main thread only.
 
     Raises AlreadyRunningError when another worker uses this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
-    abort_registry, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, abort_registry=abort_registry)
+    worker = Worker(settings)
+    worker.end_on(signal.SIGINT, signal.SIGTERM)
     try:
-        _run(settings, ending, abort_registry, keep_waiting=lambda: False)
+        worker.run(keep_waiting=lambda: False)
     except LockedError as error:
         raise AlreadyRunningError(
             f"Another Gainline worker ({error.holder or 'its process is unknown'}) already uses "
@@ -99,43 +86,11 @@ def run_supervised_worker(settings: Settings) -> None:
 
     It waits while an older worker ends, and ends with its parent once its flights are over.
     """
-    abort_registry, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGTERM, ending=ending, abort_registry=abort_registry)
-    when_parent_ends(partial(ending.set, "the web process has exited"))
+    worker = Worker(settings)
+    worker.end_on(signal.SIGTERM)
+    when_parent_ends(partial(worker.end, "the web process has exited"))
     with suppress(LockedError):  # stopped while it waited for the lock
-        _run(settings, ending, abort_registry, keep_waiting=lambda: not ending.event.is_set())
-
-
-def _run(
-    settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, *, keep_waiting: Callable[[], bool]
-) -> None:
-    prepare_data_dir(settings.data_dir)
-    narrowed = make_private(settings.data_dir)
-    configure_logs(settings.data_dir, "worker", settings.log_level)
-    if narrowed:
-        _log.warning("data folder made private", why=narrowed)
-    sys.setswitchinterval(SWITCH_EVERY_S)
-    with exclusive(settings.data_dir / "worker.lock", keep_waiting=keep_waiting):
-        require_current(settings.database_file)
-        Worker(settings, ending, abort_registry).work()
-
-
-def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, abort_registry: AbortRegistry) -> None:
-    """Install signal handlers that only queue the request, because the interrupted thread may hold any lock; a separate
-    thread handles it."""
-    asked: queue.SimpleQueue[str] = queue.SimpleQueue()
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        asked.put(signal.Signals(number).name)
-
-    def handle_signals() -> None:
-        while True:
-            ending.set(f"the worker was stopped ({asked.get()})")
-            abort_registry.abort_all(StopRequest(by=Requester.PROGRAM_STOPPED))
-
-    threading.Thread(target=handle_signals, name="signals", daemon=True).start()
-    for number in signals:
-        signal.signal(number, note)
+        worker.run(keep_waiting=lambda: not worker.closing.is_set())
 
 
 def _say_it_computes(first: Future[int]) -> None:
@@ -148,10 +103,42 @@ class Worker:
     """Everything that runs while the worker holds its lock."""
 
     settings: Settings
-    ending: ShutdownRequest
-    abort_registry: AbortRegistry
-    clock: Clock = REAL_TIME
     name: str = field(default_factory=lambda: f"{platform.node()}:{os.getpid()}", init=False)
+    abort_registry: AbortRegistry = field(default_factory=AbortRegistry, init=False)
+    closing: threading.Event = field(default_factory=threading.Event, init=False)
+    """Set when it is to end: it then claims no new work, and finishes its flights."""
+    end_reason: str = field(default="", init=False)
+
+    def end(self, reason: str) -> None:
+        self.end_reason = self.end_reason or reason
+        self.closing.set()
+
+    def end_on(self, *signals: signal.Signals) -> None:
+        """Install signal handlers that only queue the request, because the interrupted thread may hold any lock; a
+        separate thread handles it."""
+        asked: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+        def handle_signals() -> None:
+            while True:
+                self.end(f"the worker was stopped ({asked.get()})")
+                self.abort_registry.abort_all(StopRequest(by=Requester.PROGRAM_STOPPED))
+
+        threading.Thread(target=handle_signals, name="signals", daemon=True).start()
+        for number in signals:
+            signal.signal(number, lambda number, _frame: asked.put(signal.Signals(number).name))
+
+    def run(self, *, keep_waiting: Callable[[], bool]) -> None:
+        """Prepare the data folder and the logs, take the lock, and work."""
+        folder = self.settings.data_dir
+        prepare_data_dir(folder)
+        narrowed = make_private(folder)
+        configure_logs(folder, "worker", self.settings.log_level)
+        if narrowed:
+            _log.warning("data folder made private", why=narrowed)
+        sys.setswitchinterval(SWITCH_EVERY_S)
+        with exclusive(folder / "worker.lock", keep_waiting=keep_waiting):
+            require_current(self.settings.database_file)
+            self.work()
 
     def work(self) -> None:
         """Recover what the last worker left, then work until requested to end; then finish the flights and drop
@@ -174,13 +161,13 @@ class Worker:
             )
             job_runners = self._build_job_runners(database, pool, landscape_pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
-            stack.callback(self.ending.set, "the worker failed; see its log")
+            stack.callback(self.end, "the worker failed; see its log")
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid).add_done_callback(_say_it_computes)
             _log.info("worker ready", worker=self.name)
             say("The worker is ready to fly.")
             self._loop(database, lambda: self._claim(flight_runner, flying, sessions, acting, job_runners, computing))
-            _log.info("worker ends", why=self.ending.reason, flying=self.abort_registry.trial_ids())
+            _log.info("worker ends", why=self.end_reason, flying=self.abort_registry.trial_ids())
 
     def _build_runners(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
         def publish(message: PublishedMessage) -> None:
@@ -192,8 +179,7 @@ class Worker:
             abort_registry=self.abort_registry,
             publish=publish,
             worker=self.name,
-            closing=self.ending.event,
-            clock=self.clock,
+            closing=self.closing,
         )
         sessions = VehicleConnectionManager(part, links=is_loopback(self.settings.host))
         live = LiveServer(live_address(part.data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
@@ -204,9 +190,7 @@ class Worker:
         self, database: Database, pool: ComputePool, landscape_pool: ComputePool
     ) -> tuple[JobRunner, ...]:
         proposer = partial(compute_proposal, database, pool, worker=self.name)
-        reproducer = ReproductionJob(
-            database, worker=self.name, lease_s=self.settings.lease_s, closing=self.ending.event
-        )
+        reproducer = ReproductionJob(database, worker=self.name, lease_s=self.settings.lease_s, closing=self.closing)
         landscaper = partial(
             compute_landscape, database, landscape_pool, worker=self.name, lease_s=self.settings.lease_s
         )
@@ -216,27 +200,19 @@ class Worker:
             (LANDSCAPE_JOB, landscaper, LANDSCAPES_AT_ONCE),
         )
         return tuple(
-            JobRunner(
-                database,
-                kind,
-                perform,
-                room=room,
-                worker=self.name,
-                lease_s=self.settings.lease_s,
-                clock=self.clock,
-            )
+            JobRunner(database, kind, perform, room=room, worker=self.name, lease_s=self.settings.lease_s)
             for kind, perform, room in performed
         )
 
     def _loop(self, database: Database, claim: Callable[[], None]) -> None:
         with DatabaseWatch(database.file) as watch:
-            while not self.ending.event.is_set():
+            while not self.closing.is_set():
                 try:
                     claim()
                 except StorageError as error:
                     _log.error("work cannot be claimed", why=str(error))
-                    self.ending.event.wait(self.clock.wall_s(RETRY_S))
-                watch.wait(self.ending.event, LOOK_ANYWAY_S)
+                    self.closing.wait(RETRY_S)
+                watch.wait(self.closing, LOOK_ANYWAY_S)
 
     def _claim(
         self,
@@ -258,11 +234,13 @@ class Worker:
             runner.heartbeat()
 
     def _until_stored(self, work: Callable[[], None]) -> None:
-        def refused(error: StorageError) -> None:
-            _log.error("the worker cannot start", why=str(error))
-
-        if not self.ending.event.is_set():
-            retry_until_stored(work, refused, closing=self.ending.event, clock=self.clock)
+        if not self.closing.is_set():
+            retry_until_stored(
+                work,
+                lambda error: _log.error("the worker cannot start", why=str(error)),
+                closing=self.closing,
+                clock=REAL_TIME,
+            )
 
     def _hello(self) -> WorkerHello:
         return WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids())

@@ -196,6 +196,16 @@ class CheckItem:
     hint: str = ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConnectionOpened:
+    """What was found when the link was opened; `concern` is why the vehicle may only be observed, and `held` are its
+    gains, empty where it did not report them."""
+
+    identity: Identity
+    concern: str = ""
+    held: Mapping[str, float] = field(default_factory=dict)
+
+
 class ConnectedVehicle(Vehicle, Protocol):
     """A vehicle whose link stays open between flights. To be used by one thread only.
 

@@ -19,6 +19,7 @@ from starlette.exceptions import HTTPException
 from app.common.errors import (
     BusyError,
     ConflictError,
+    ForeignRequestError,
     GainlineError,
     GainsError,
     InputError,
@@ -26,19 +27,22 @@ from app.common.errors import (
     MediaTypeError,
     NotAllowedError,
     NotFoundError,
+    Problem,
     StorageError,
     TooLargeError,
     TrajectoryError,
     UnavailableError,
     UnconfirmedError,
 )
-from app.common.schemas import Problem, ProblemField
+from app.common.schemas import Problem as ProblemDetails
+from app.common.schemas import ProblemField
 from app.live.link import LinkDownError
 
 MEDIA_TYPE: Final = "application/problem+json"
 
 _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
     NotAllowedError: (HTTPStatus.FORBIDDEN, "Not allowed"),
+    ForeignRequestError: (HTTPStatus.FORBIDDEN, "Foreign request"),
     NotFoundError: (HTTPStatus.NOT_FOUND, "Not found"),
     BusyError: (HTTPStatus.CONFLICT, "Vehicle busy"),
     ConflictError: (HTTPStatus.CONFLICT, "Conflict"),
@@ -83,11 +87,8 @@ def install(app: FastAPI) -> None:
 
     def complete() -> dict[str, Any]:
         document = plain()
-        schemas = document.setdefault("components", {}).setdefault("schemas", {})
-        if "Problem" not in schemas:
-            problem = Problem.model_json_schema(ref_template=REF_TEMPLATE)
-            schemas.update(problem.pop("$defs"))
-            schemas["Problem"] = problem
+        problem = ProblemDetails.model_json_schema(ref_template=REF_TEMPLATE)
+        document["components"]["schemas"] |= {**problem.pop("$defs"), "Problem": problem}
         return document
 
     app.openapi = complete  # type: ignore[method-assign]
@@ -112,7 +113,7 @@ def _problem(
     headers: Mapping[str, str] | None = None,
 ) -> Response:
     kind = f"urn:gainline:{title.lower().replace(' ', '-')}" if title else "about:blank"
-    body = Problem(
+    body = ProblemDetails(
         type=kind,
         title=title or HTTPStatus(status).phrase,
         status=status,
@@ -138,10 +139,7 @@ def problem_response(error: GainlineError) -> Response:
         status,
         error.message,
         error.hint,
-        [
-            ProblemField(field=problem.field, reason=problem.reason, offer=dict(problem.offer))
-            for problem in error.problems
-        ],
+        [ProblemField.view_of(problem) for problem in error.problems],
         title=title,
         script_hint=error.script_hint,
     )
@@ -151,24 +149,23 @@ async def _invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     body = getattr(request.scope.get("route"), "body_field", None)
     schema = None if body is None else body.field_info.annotation
-    problems = [_refused(found, schema) for found in error.errors()]
-    return _problem(
-        HTTPStatus.UNPROCESSABLE_ENTITY,
-        "Some values cannot be used; nothing was changed.",
-        "Correct the fields listed, then try again.",
-        problems,
-        title="Unusable input",
-        script_hint="The fields of every request are described in /api/openapi.json.",
+    return problem_response(
+        InputError(
+            "Some values cannot be used; nothing was changed.",
+            hint="Correct the fields listed, then try again.",
+            problems=tuple(_refused(found, schema) for found in error.errors()),
+            script_hint="The fields of every request are described in /api/openapi.json.",
+        )
     )
 
 
-def _refused(found: Mapping[str, Any], schema: object) -> ProblemField:
+def _refused(found: Mapping[str, Any], schema: object) -> Problem:
     """The refused field, dotted as the caller wrote it: without the part of the request, unless there is nothing
     else."""
     part, *inner = found["loc"]
     if found["type"] == "json_invalid":
-        return ProblemField(field="body", reason=f"is not JSON: {found['ctx']['error']}, at character {inner[0]}")
-    return ProblemField(field=".".join(map(str, inner or [part])), reason=reason_of(found, schema))
+        return Problem("body", f"is not JSON: {found['ctx']['error']}, at character {inner[0]}")
+    return Problem(".".join(map(str, inner or [part])), reason_of(found, schema))
 
 
 _SHOWN: Final = 40
@@ -260,20 +257,14 @@ async def _http_error(request: Request, error: Exception) -> Response:
     return _problem(error.status_code, detail, hint, headers=error.headers)
 
 
-def foreign_request_response(detail: str, hint: str) -> Response:
-    """Response to a request of another site or under a foreign host name."""
-    return _problem(HTTPStatus.FORBIDDEN, detail, hint, title="Foreign request")
-
-
 async def _system_error(request: Request, error: Exception) -> Response:
     """Answer an OSError; a full disk may also appear outside the database, for instance while an upload is spooled."""
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
-        return await _own_error(
-            request,
+        return problem_response(
             StorageError(
                 "The disk is full; nothing from this request was stored.",
                 hint="Free some disk space, then try again. Everything stored before is intact.",
-            ),
+            )
         )
     return await _unexpected(request, error)
 

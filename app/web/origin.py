@@ -14,14 +14,13 @@ from urllib.parse import urlsplit
 
 from fastapi import Request
 from starlette.datastructures import Headers
-from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Caller, Key, Permission, RequestOrigin, require
-from app.common.errors import NotAllowedError
+from app.common.errors import ForeignRequestError, NotAllowedError
 from app.common.settings import is_loopback
-from app.web.errors import foreign_request_response, problem_response
+from app.web.errors import problem_response
 
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _COSTLY: Final = ("/api/system/backup", "/report.pdf", "/bundle")
@@ -44,34 +43,34 @@ class AccessMiddleware:
     app: ASGIApp
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http" and (refusal := _refusal(Request(scope))) is not None:
-            await refusal(scope, receive, send)
-            return
+        if scope["type"] == "http":
+            try:
+                _require_admitted(Request(scope))
+            except NotAllowedError as error:
+                await problem_response(error)(scope, receive, send)
+                return
         await self.app(scope, receive, send)
 
 
-def _refusal(request: Request) -> Response | None:
+def _require_admitted(request: Request) -> None:
+    """Raise NotAllowedError for a request that is refused whatever it asks for."""
     address = request.headers.get("host", "")
     name = _name_of(address)
     own_names = {"localhost", request.app.state.settings.host.lower()}
     if name not in own_names and not _is_ip_address(name):  # DNS rebinding needs a name
-        return foreign_request_response(
+        raise ForeignRequestError(
             f"This server does not accept requests for the host name “{address}”.",
-            "Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
+            hint="Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
         )
     path: str = request.scope["path"]
     changes = request.method not in _READS
     if (changes or path.startswith("/api/")) and _is_foreign(request.headers, address):
-        return foreign_request_response(
+        raise ForeignRequestError(
             "The request came from a page of another site and was rejected.",
-            "Use the dashboard, or send the request from a program without the header Origin.",
+            hint="Use the dashboard, or send the request from a program without the header Origin.",
         )
     if changes or path.endswith(_COSTLY):
-        try:
-            require(Permission.CHANGE, caller_of(request))
-        except NotAllowedError as error:
-            return problem_response(error)
-    return None
+        require(Permission.CHANGE, caller_of(request))
 
 
 def caller_of(request: Request) -> Caller:

@@ -17,11 +17,11 @@ from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
 from app.flights.flight_process import VehicleConnection
-from app.flights.process_messages import ConnectionOpened, status_time
+from app.flights.process_messages import status_time
 from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.live.messages import VehicleStatus
 from app.main import create_app
-from app.vehicles.base import CheckItem, Identity
+from app.vehicles.base import CheckItem, ConnectionOpened, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
 from tests.fleet.vehicles import (
     DEFAULT_GAINS,
@@ -131,7 +131,9 @@ def test_a_connection_pins_the_identity_and_reports_the_gains(client: TestClient
         DEFAULT_GAINS,
     )
     with database.write() as session:
-        commands.record_connected(session, vehicle["id"], Identity(system_id=9, autopilot="px4", version=""))
+        commands.record_connected(
+            session, vehicle["id"], ConnectionOpened(identity=Identity(system_id=9, autopilot="px4", version=""))
+        )
     assert seen(client, vehicle)["identity"]["system_id"] == 1
 
 
@@ -317,8 +319,7 @@ def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else
         commands.quarantine_vehicle(session, doubted["id"], "not verified")
     ask(client, wanted, "restore")
     with database.write() as session:
-        commands.withdraw_acts(session)
-        commands.forget_connections(session)
+        commands.recover(session)
         commands.request_reconnections(session)
     states = [seen(client, vehicle)["state"] for vehicle in (wanted, closed, doubted)]
     assert states == ["disconnected", "disconnected", "quarantined"]
@@ -364,7 +365,9 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     finish_act(database)
     with database.write() as session:  # found in the very moment in which it was not wanted any more
         identity = Identity(system_id=9, autopilot="paparazzi", version="")
-        assert not commands.record_reconnected(session, known["id"], identity, concern="", held=known["safe_gains"])
+        assert not commands.record_reconnected(
+            session, known["id"], ConnectionOpened(identity=identity, concern="", held=known["safe_gains"])
+        )
     with database.read() as session:
         assert commands.list_vehicles_to_reconnect(session) == []
     assert seen(client, known)["state"] == "disconnected"
@@ -379,8 +382,7 @@ def test_a_vehicle_may_be_in_the_air_after_a_flight_until_its_gains_are_read_or_
 
     def may_fly() -> bool:
         with database.write() as session:
-            commands.withdraw_acts(session)
-            commands.forget_connections(session)
+            commands.recover(session)
             (found,) = commands.list_vehicles_to_reconnect(session)
         return found.was_flying
 
@@ -394,7 +396,9 @@ def test_a_vehicle_may_be_in_the_air_after_a_flight_until_its_gains_are_read_or_
         flight_rows.lose_running_flights(session)
     assert may_fly()
     with database.write() as session:
-        assert commands.record_reconnected(session, vehicle["id"], IDENTITY, concern="It is armed.", held={})
+        assert commands.record_reconnected(
+            session, vehicle["id"], ConnectionOpened(identity=IDENTITY, concern="It is armed.")
+        )
         commands.record_disconnected(session, vehicle["id"])
     assert newest(client, vehicle)["reason"] == "It is armed."
     assert may_fly(), "no gains were read of an armed vehicle"
@@ -419,7 +423,9 @@ def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent
     finish_act(database, problem="nobody answers")
     with database.write() as session:
         identity = Identity(system_id=1, autopilot="paparazzi", version="")
-        assert commands.record_reconnected(session, vehicle["id"], identity, concern="It is armed.", held={})
+        assert commands.record_reconnected(
+            session, vehicle["id"], ConnectionOpened(identity=identity, concern="It is armed.")
+        )
     given = client.get(f"/api/vehicles/{vehicle['id']}/ledger").json()["items"]
     assert [(line["purpose"], line["asked"], line["read_back"]) for line in given] == [("connect", {}, DEFAULT_GAINS)]
 
@@ -438,7 +444,7 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
         def wait_until_open(self) -> ConnectionOpened:
             ask(client, vehicle, "disconnect")
             with database.write() as session:
-                commands.withdraw_acts(session)
+                commands.recover(session)
             events.append("found")
             return ConnectionOpened(identity=IDENTITY, concern="", held=dict(DEFAULT_GAINS))
 
@@ -465,7 +471,7 @@ def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: 
         commands.claim_act(session, WORKER)
     ask(client, waiting, "restore")
     with database.write() as session:
-        commands.withdraw_acts(session)
+        commands.recover(session)
     assert [(newest(client, vehicle)["state"], newest(client, vehicle)["problem"]) for vehicle in (begun, waiting)] == [
         ("failed", "It was not finished: the worker stopped. Request it again if it is still needed."),
         (
@@ -529,7 +535,7 @@ def test_version_and_hardware_id_are_pinned_when_they_are_told_and_changed_by_a_
 
     def connected_as(value: str) -> str:
         with database.write() as session:
-            commands.record_connected(session, vehicle["id"], identity(value))
+            commands.record_connected(session, vehicle["id"], ConnectionOpened(identity=identity(value)))
         lose_link(database, vehicle)
         return pinned()
 

@@ -8,6 +8,7 @@ from app.db.models import VehicleRow
 from app.db.session import Database
 from app.fleet import commands
 from app.main import create_app
+from app.vehicles.base import ConnectionOpened
 from tests.builders import create_campaign, get, problems_of
 from tests.fleet.vehicles import (
     DEFAULT_GAINS,
@@ -191,7 +192,7 @@ def test_the_link_changes_only_while_it_is_closed_and_pins_the_identity_anew(
     assert (edited["options"]["system_id"], edited["identity"], edited["version"]) == (5, None, 3)
     assert edited["options"]["simulated"] is True
     with database.write() as session:
-        commands.record_connected(session, vehicle["id"], IDENTITY)
+        commands.record_connected(session, vehicle["id"], ConnectionOpened(identity=IDENTITY))
     assert seen(client, vehicle)["identity"]["system_id"] == 1
 
 
@@ -290,7 +291,9 @@ def test_a_vehicle_in_quarantine_is_neither_deleted_nor_given_other_settings(
     vehicle = register(client)
     path = f"/api/vehicles/{vehicle['id']}"
     with database.write() as session:
-        commands.record_connected(session, vehicle["id"], IDENTITY, concern="Its gains are unknown.")
+        commands.record_connected(
+            session, vehicle["id"], ConnectionOpened(identity=IDENTITY, concern="Its gains are unknown.")
+        )
         commands.record_disconnected(session, vehicle["id"])
     assert seen(client, vehicle)["actions"] == ["connect", "edit"]
     for refused in (
@@ -321,4 +324,4 @@ def test_a_vehicle_that_was_deleted_meanwhile_is_not_reconnected(client: TestCli
     vehicle = register(client)
     assert client.delete(f"/api/vehicles/{vehicle['id']}", params={"version": 1}).status_code == 204
     with database.write() as session:
-        assert not commands.record_reconnected(session, vehicle["id"], IDENTITY, concern="", held={})
+        assert not commands.record_reconnected(session, vehicle["id"], ConnectionOpened(identity=IDENTITY))

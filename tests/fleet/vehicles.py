@@ -8,7 +8,7 @@ from app.common.states import TrialState, VehicleState
 from app.db.models import TrialRow, VehicleRow
 from app.db.session import Database
 from app.fleet import commands
-from app.vehicles.base import Identity
+from app.vehicles.base import ConnectionOpened, Identity
 from tests.builders import WORKER, Json, get, run_jobs
 from tests.unlocking import unlock
 
@@ -36,8 +36,9 @@ def connect(client: httpx2.Client, database: Database, vehicle: Json, *, concern
     with database.write() as session:
         task = commands.claim_act(session, WORKER)
         assert task is not None
-        held = None if concern else task.vehicle.safe_gains
-        commands.finish_connect(session, task, IDENTITY, concern=concern, held=held)
+        held = {} if concern else task.vehicle.safe_gains
+        opened = ConnectionOpened(identity=IDENTITY, concern=concern, held=held)
+        commands.finish_connect(session, task, opened)
     return seen(client, vehicle)
 
 

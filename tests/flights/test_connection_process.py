@@ -20,9 +20,7 @@ from app.flights.connection_process import VehicleProcess
 from app.flights.flight_loop import PipeClosedError, WorkerPipe
 from app.flights.process_messages import (
     CancelFlight,
-    CancelTakeOff,
     CommandForwarded,
-    ConnectionOpened,
     ConnectionRequest,
     FlightFailure,
     FlightFinished,
@@ -31,11 +29,11 @@ from app.flights.process_messages import (
     FromVehicleProcess,
     GainsStaged,
     SafeGainsRestored,
-    TakeOffCommand,
+    TakeOffDecision,
     VehicleCommand,
     VehicleRequest,
 )
-from app.vehicles.base import Identity, LinkedVehicle
+from app.vehicles.base import ConnectionOpened, Identity, LinkedVehicle
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -163,7 +161,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
         rig.drone.autopilot.ignores_parameters = not takes_its_safe_gains
 
     line.on_staged = refuse
-    line.workers_end.send(TakeOffCommand(by_s=math.inf))
+    line.workers_end.send(TakeOffDecision(by_s=math.inf))
     process._carry_out(flight_of(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
@@ -177,7 +175,7 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(
     rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
 ) -> None:
     """Observed defect: the process was suspended for 20 s, and the vehicle took off unexpectedly afterwards."""
-    line.workers_end.send(TakeOffCommand(by_s=time.monotonic() - 0.001))
+    line.workers_end.send(TakeOffDecision(by_s=time.monotonic() - 0.001))
     process._carry_out(flight_of(rig, tmp_path))
     staged, restored, failure, _ = (said for said in line.said if not isinstance(said, ConnectionOpened))
     assert (staged, restored) == (GainsStaged(dict(TUNED)), SafeGainsRestored(dict(SAFE)))
@@ -206,7 +204,7 @@ def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
         rig.on_heard = stand_still
 
     line.on_staged = watch
-    line.workers_end.send(TakeOffCommand(by_s=time.monotonic() + 3600.0))
+    line.workers_end.send(TakeOffDecision(by_s=time.monotonic() + 3600.0))
     process._carry_out(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert (failure.not_flown, failure.unsafe, "too late" in failure.what) == (True, False, True)
@@ -326,7 +324,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     """Land, and motors off at once after it, which comes while the safe gains are given back; what waits before them in
     the pipe is kept."""
     line.workers_end.send(CancelFlight(9, StopRequest("of another flight")))
-    line.on_staged = lambda: line.workers_end.send(CancelTakeOff())
+    line.on_staged = lambda: line.workers_end.send(TakeOffDecision(None))
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
     process._carry_out(flight_of(rig, tmp_path))
     answers = [said for said in line.said if isinstance(said, CommandForwarded)]
@@ -345,7 +343,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
 def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_ground(
     rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
 ) -> None:
-    line.workers_end.send(TakeOffCommand(by_s=math.inf))
+    line.workers_end.send(TakeOffDecision(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_REQUEST_READ", LAND)
     process._carry_out(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
@@ -358,7 +356,7 @@ def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_groun
 def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_out_and_they_are_verified(
     rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
 ) -> None:
-    line.workers_end.send(TakeOffCommand(by_s=math.inf))
+    line.workers_end.send(TakeOffDecision(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_SET", MOTORS_OFF, nth=2)
     process._carry_out(flight_of(rig, tmp_path))
     assert stop_outcomes(process, line) == [""]
@@ -398,7 +396,7 @@ def test_motors_off_is_done_only_once_the_vehicle_has_confirmed_it(
     rig.on_heard = fall_silent
     if in_flight:
         ordered, receive = [MOTORS_OFF], line.receive
-        line.workers_end.send(TakeOffCommand(by_s=math.inf))
+        line.workers_end.send(TakeOffDecision(by_s=math.inf))
         monkeypatch.setattr(
             line, "receive", lambda: ordered.pop() if ordered and rig.drone.body.altitude_m > 1.0 else receive()
         )

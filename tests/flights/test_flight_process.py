@@ -62,7 +62,7 @@ def fly(
 
     for said in flight_process.fly(asked):
         if isinstance(said, GainsStaged):
-            flight_process.take_off()
+            flight_process.decide(takes_off=True)
         heard.append(said)
         on_said(said)
     return heard
@@ -142,7 +142,7 @@ def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> No
     heard = []
     for said in flight_process.fly(flight_of()):
         heard.append(said)
-        flight_process.cancel_take_off()
+        flight_process.decide(takes_off=False)
     assert heard == [GainsStaged(GAINS)]
 
 
@@ -152,7 +152,7 @@ def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(flig
         heard.append(said)
         if isinstance(said, GainsStaged):
             flight_process.cancel_flight(1, StopRequest("not today"))
-            flight_process.take_off()
+            flight_process.decide(takes_off=True)
     aborted = landed_of(heard)
     assert (aborted.ending, aborted.reason) == ("aborted", "not today")
     assert aborted.trajectory["altitude_m"].max() < 0.05

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.common.errors import StorageError
+from app.common.errors import InputError
 from app.core.records.trajectory import Trajectory
 from app.flights.record_spool import RESERVED_BYTES, Spool
 from app.vehicles.base import FlightRecord
@@ -67,7 +67,7 @@ def test_a_damaged_record_is_refused_and_can_be_set_aside(tmp_path: Path) -> Non
     content = bytearray(path.read_bytes())
     content[5000] ^= 1
     path.write_bytes(content)
-    with pytest.raises(StorageError, match="checksum"):
+    with pytest.raises(InputError, match="checksum"):
         spool.read(1)
     aside = spool.set_aside(1)
     assert aside is not None

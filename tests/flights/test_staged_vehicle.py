@@ -7,14 +7,13 @@ from pathlib import Path
 import pytest
 
 from app.flights.process_messages import (
-    CancelTakeOff,
     FlightFailure,
     FlightFinished,
     FromVehicleProcess,
     GainsStaged,
     SafeGainsRestored,
     StagingLost,
-    TakeOffCommand,
+    TakeOffDecision,
     ToVehicleProcess,
 )
 from app.live.messages import UnreadyReason, VehicleStatus
@@ -98,7 +97,7 @@ def nothing(_rig: AnsweringRig) -> None: ...
 def staged_for(
     rig: AnsweringRig, folder: Path, *acts: tuple[float, Act], answer: ToVehicleProcess | None = None
 ) -> TimedPipe:
-    line = TimedPipe(rig, list(acts), answer or CancelTakeOff())
+    line = TimedPipe(rig, list(acts), answer or TakeOffDecision(None))
     process = started(rig, line, folder, SAFE[rig.autopilot])
     assert process._vehicle.concern == ""
     order = flight_of(rig, folder)
@@ -162,7 +161,7 @@ def test_gains_that_another_program_changed_during_a_silence_are_no_longer_stage
 
 @pytest.mark.complete
 def test_a_take_off_that_crosses_the_loss_of_the_gains_is_not_flown(rig: AnsweringRig, tmp_path: Path) -> None:
-    line = staged_for(rig, tmp_path, (3.0, restart), (20.0, nothing), answer=TakeOffCommand(by_s=float("inf")))
+    line = staged_for(rig, tmp_path, (3.0, restart), (20.0, nothing), answer=TakeOffDecision(by_s=float("inf")))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert failure.not_flown
     assert not failure.unsafe
@@ -170,6 +169,6 @@ def test_a_take_off_that_crosses_the_loss_of_the_gains_is_not_flown(rig: Answeri
 
 
 def test_a_take_off_during_a_silence_is_not_flown(rig: AnsweringRig, tmp_path: Path) -> None:
-    line = staged_for(rig, tmp_path, (3.0, silence(4.0)), (5.5, nothing), answer=TakeOffCommand(by_s=float("inf")))
+    line = staged_for(rig, tmp_path, (3.0, silence(4.0)), (5.5, nothing), answer=TakeOffDecision(by_s=float("inf")))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert failure.not_flown

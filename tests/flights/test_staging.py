@@ -631,9 +631,9 @@ def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_not_said_to_have_land
     client: TestClient, database: Database, real: Json, staged: Json, motors_off: bool
 ) -> None:
     """Observed defect: “Landed” was ticked for a drone that fell from 3 m."""
+    record, _, concern = stopped_drone("paparazzi", 4.0, motors_off=motors_off)
     report(client, staged)
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
-    record, _, concern = stopped_drone("paparazzi", 4.0, motors_off=motors_off)
     assert bool(concern) == motors_off
     outcome = FlightOutcome(record=record, concern=concern)
     with database.write() as session:

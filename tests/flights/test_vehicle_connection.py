@@ -14,9 +14,9 @@ import pytest
 
 from app.flights import flight_process as session_module
 from app.flights.flight_process import VehicleConnection
-from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleCommand
+from app.flights.process_messages import CommandForwarded, ConnectionRequest, VehicleCommand
 from app.live.messages import VehicleStatus
-from app.vehicles.base import Identity, LinkedVehicle
+from app.vehicles.base import ConnectionOpened, Identity, LinkedVehicle
 from tests.flights.process_ids import pid_of
 from tests.waiting import Waits
 

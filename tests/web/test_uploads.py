@@ -136,7 +136,7 @@ def uploads_of(client: TestClient) -> dict[str, list[str]]:
 @pytest.mark.complete
 def test_every_route_for_files_refuses_what_is_too_large_whatever_its_length_says(strict: TestClient) -> None:
     uploads = uploads_of(strict)
-    assert len(uploads) == 7
+    assert len(uploads) == 6
     part = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a"\r\n\r\n'
     sent = [(path, kind, part if kind == FORM else b"") for path, kinds in uploads.items() for kind in kinds]
     for path, kind, first in [*sent, ("/api/campaigns", "application/json", b'"')]:
