@@ -1,4 +1,4 @@
-import { Box, Button, Group, SegmentedControl, SimpleGrid, Skeleton, TextInput, Title } from "@mantine/core";
+import { Button, Group, SegmentedControl, SimpleGrid, Skeleton, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -8,7 +8,7 @@ import type { Sort } from "../../api/types";
 import { SelectField } from "../../ui/Fields";
 import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
-import { addPage } from "../../ui/paging";
+import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
@@ -36,9 +36,8 @@ export function CampaignListPage() {
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
   const filtered = sought !== "" || state !== "all" || vehicle !== "";
   const campaigns = useCampaigns({ search: sought, state: STATES[state], vehicle: vehicle ? [vehicle] : [], sort });
-  const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
-  const total = campaigns.data?.pages[0]?.total ?? 0;
-  if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
+  const found = campaigns.data?.items ?? [];
+  if (campaigns.data?.total === 0 && !filtered) return <FirstCampaign />;
   return (
     <>
       <Group gap={12} mb={14}>
@@ -50,7 +49,7 @@ export function CampaignListPage() {
         </Button>
         <ImportBundle />
       </Group>
-      <Group component="search" gap={10} mb={18} className={classes["filters"] ?? ""}>
+      <Group component="search" gap={10} mb={18} className={classes["filters"]}>
         <TextInput
           flex="1 1 160px"
           aria-label="Search campaigns by name"
@@ -109,13 +108,7 @@ export function CampaignListPage() {
           <CampaignCard key={campaign.id} campaign={campaign} />
         ))}
       </SimpleGrid>
-      {campaigns.hasNextPage && (
-        <Box mt={20} ta="center">
-          <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
-            Show more ({found.length} of {total})
-          </Button>
-        </Box>
-      )}
+      <ShowMore list={campaigns} mt={20} mx="auto" display="block" />
     </>
   );
 }

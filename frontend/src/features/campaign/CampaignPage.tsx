@@ -1,4 +1,4 @@
-import { Group, SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
+import { Group, SimpleGrid, Skeleton, Tabs } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
 import { flushSync } from "react-dom";
 import { useParams } from "react-router";
@@ -38,25 +38,24 @@ function CampaignById({ campaignId }: { campaignId: number }) {
 }
 
 /** The two columns of the page. */
-const SIDE_BY_SIDE = { className: classes["columns"] ?? "", align: "stretch", gap: "var(--gap)" };
+const SIDE_BY_SIDE = { className: classes["columns"], align: "stretch", gap: "var(--gap)" };
 
 /** Loading state. Requests all data of the page in parallel. */
 function Coming({ campaignId }: { campaignId: number }) {
-  const theme = useComputedColorScheme("light");
   useCatalogue();
   useTrials(campaignId);
   useProposal(campaignId);
-  useCampaignFigure(campaignId, "takeoffs", theme);
-  useCampaignFigure(campaignId, "errors", theme);
-  useCampaignFigure(campaignId, "gains", theme);
+  useCampaignFigure(campaignId, "takeoffs");
+  useCampaignFigure(campaignId, "errors");
+  useCampaignFigure(campaignId, "gains");
   useEffect(() => {
     loadPlotly().catch(() => undefined); // the chart loads it again and reports the error
   }, []);
   return (
     <div className={classes["page"]}>
       <Group aria-busy="true" {...SIDE_BY_SIDE}>
-        <Skeleton height={480} radius="md" className={classes["results"] ?? ""} />
-        <Skeleton height={480} radius="md" className={classes["action"] ?? ""} />
+        <Skeleton height={480} radius="md" className={classes["results"]} />
+        <Skeleton height={480} radius="md" className={classes["action"]} />
       </Group>
     </div>
   );
@@ -76,7 +75,7 @@ function CampaignView({ campaign }: { campaign: Campaign }) {
   const [tab, openTab] = useTab();
   const standing = useCampaignStatus(campaign.id);
   const problem = useProposal(campaign.id).error ?? trouble;
-  const unit = useUnits(campaign.definition.experiment ?? "takeoff").error;
+  const unit = useUnits(campaign.definition.experiment).error;
   const shown = shownTrial(trials, chosen, standing?.campaign ?? campaign);
   const watching = useReadOnlyReason(campaign.vehicle);
   const choose = useCallback(
@@ -122,13 +121,7 @@ function CampaignView({ campaign }: { campaign: Campaign }) {
           {standing === null && <ErrorNotice error={problem} />}
         </div>
       </Group>
-      <Tabs
-        value={tab}
-        onChange={openTab}
-        mt="var(--gap)"
-        keepMounted={false}
-        classNames={{ tab: classes["tab"] ?? "" }}
-      >
+      <Tabs value={tab} onChange={openTab} mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] }}>
         <Tabs.List>
           <Tabs.Tab value="trends">Error and gains</Tabs.Tab>
           <Tabs.Tab value="flights">

@@ -1,4 +1,4 @@
-import { Box, Button, Group, Stack, Text, Title, useComputedColorScheme } from "@mantine/core";
+import { Box, Button, Group, Stack, Text, Title } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
@@ -132,7 +132,7 @@ interface ComparedProps {
 }
 
 function Compared({ comparison, trials, choose }: ComparedProps) {
-  const figure = useComparisonFigure(trials, useComputedColorScheme("light"));
+  const figure = useComparisonFigure(trials);
   const pens = useMemo(() => lineStylesOf(figure.data), [figure.data]);
   const { verdict, sentence, notes, flights, pairs } = comparison;
   const Icon = ICONS[verdict ?? "unresolved"];

@@ -83,7 +83,7 @@ function Trouble({ children }: { children: ReactNode }) {
 
 /** What connecting does, and why it has not succeeded yet. */
 function NotConnected({ vehicle }: { vehicle: Vehicle }) {
-  const acts = useActs(vehicle.id).data?.pages[0]?.items ?? [];
+  const acts = useActs(vehicle.id).data?.items ?? [];
   const isWanted = vehicle.actions.includes("disconnect");
   const other = vehicleAtSameAddress(vehicle, useVehicles().data ?? []);
   const failure = connectFailure(acts);

@@ -1,4 +1,4 @@
-import { Anchor, Button, Skeleton, Stack, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Skeleton, Stack } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useActs, useLedger } from "../../api/fleet";
@@ -11,8 +11,8 @@ import { gainsInBrackets, sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { addPage } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
+import { ShowMore } from "../../ui/ShowMore";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { ACTS, purposeOf } from "./fleet";
@@ -32,7 +32,7 @@ export function VehicleHistory({ vehicle }: { vehicle: Pick<Vehicle, "id" | "reg
 /** All gain sets written to the vehicle, and the values read back. */
 function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> }) {
   const ledger = useLedger(vehicle.id);
-  const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
+  const lines = ledger.data?.items ?? [];
   const names = Object.keys(vehicle.safe_gains);
   return (
     <Panel title="Gain history" className={classes["wide"]}>
@@ -56,11 +56,7 @@ function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> 
           </tbody>
         </ScrollTable>
       )}
-      {ledger.hasNextPage && (
-        <Button variant="default" mt={12} loading={ledger.isFetchingNextPage} onClick={() => void addPage(ledger)}>
-          Show more ({lines.length} of {ledger.data?.pages[0]?.total})
-        </Button>
-      )}
+      <ShowMore list={ledger} mt={12} />
     </Panel>
   );
 }
@@ -98,7 +94,7 @@ const OF_FLIGHTS: ReadonlySet<string> = new Set(["stage", "take-off", "unstage",
 /** What people asked of the vehicle: who, when, outcome. */
 function RequestList({ vehicleId }: { vehicleId: number }) {
   const acts = useActs(vehicleId);
-  const items = acts.data?.pages.flatMap((page) => page.items) ?? [];
+  const items = acts.data?.items ?? [];
   return (
     <Panel title="Command log" className={classes["wide"]}>
       <ErrorNotice error={acts.error} />
@@ -130,11 +126,7 @@ function RequestList({ vehicleId }: { vehicleId: number }) {
           ))}
         </tbody>
       </ScrollTable>
-      {acts.hasNextPage && (
-        <Button variant="default" mt={12} loading={acts.isFetchingNextPage} onClick={() => void addPage(acts)}>
-          Show more ({items.length} of {acts.data?.pages[0]?.total})
-        </Button>
-      )}
+      <ShowMore list={acts} mt={12} />
     </Panel>
   );
 }
@@ -144,14 +136,13 @@ const heightOf = (card: FigureCard | undefined, ready: number) => (card?.state =
 
 /** Fitted parameters of the vehicle over its flights, whether they changed, and its batteries. */
 function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
-  const theme = useComputedColorScheme("light");
   const known = useCalibration(vehicleId);
-  const calibration = useVehicleFigure(vehicleId, "calibration", theme);
-  const batteries = useVehicleFigure(vehicleId, "batteries", theme);
+  const calibration = useVehicleFigure(vehicleId, "calibration");
+  const batteries = useVehicleFigure(vehicleId, "batteries");
   const retune = known.data?.retune;
   return (
     <>
-      <Stack gap={14} className={classes["wide"] ?? ""}>
+      <Stack gap={14} className={classes["wide"]}>
         <ErrorNotice error={known.error} />
         {retune?.due && (
           <Aside tone="warn" display="flex" style={{ gap: 8 }} role="status">

@@ -27,7 +27,7 @@ export function VehiclePage() {
   const vehicles = useVehicles();
   const vehicle = vehicles.data?.find(({ id }) => id === vehicleId);
   useTitle(vehicle?.name ?? "Vehicle");
-  if (vehicle?.registered === false) return <SharedView vehicle={vehicle} />;
+  if (vehicle?.registered === false) return <SharedView key={vehicle.id} vehicle={vehicle} />;
   if (vehicle !== undefined) return <VehicleView key={vehicle.id} vehicle={vehicle} />;
   if (vehicles.error) return <ErrorNotice error={vehicles.error} />;
   return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;

@@ -91,7 +91,7 @@ interface Props {
 /** All parameters of the vehicle, as last read. */
 export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
   const [wanted, setWanted] = useState("");
-  const acts = useActs(vehicleId).data?.pages.flatMap((page) => page.items) ?? [];
+  const acts = useActs(vehicleId).data?.items ?? [];
   const latest = acts.find(({ kind }) => kind === "parameters");
   const read = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
   const underWay = latest?.state === "requested" || latest?.state === "running";
