@@ -14,7 +14,7 @@ export interface NumberFieldProps extends Omit<TextInputProps, "value" | "onChan
   /** Value of an empty field; without it the field must be filled. */
   empty?: number;
   /** Whether only whole numbers are valid. */
-  whole?: boolean | undefined;
+  whole?: boolean;
 }
 
 /** Number input. Passes on valid input as a number and anything else as text, with an error message. */
@@ -83,7 +83,7 @@ interface OptionFieldProps {
   onChange: (value: OptionValue) => void;
 }
 
-function rangeOf({ lower = null, upper = null, unit = "" }: OptionInfo): string | undefined {
+function rangeOf({ lower, upper, unit }: OptionInfo): string | undefined {
   const after = unitAfter(unit);
   if (lower === null && upper === null) return after.trim() || undefined;
   return `${lower ?? "…"} … ${upper ?? ""}${after}`.trim();

@@ -173,7 +173,7 @@ export function connectFailure(acts: readonly VehicleAct[]): string {
 /** Options of the collapsed section; those of this autopilot alone, if one is given. */
 export function furtherOptions(catalogue: Catalogue, autopilot?: string): OptionInfo[] {
   const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
-  const isOffered = ({ autopilots = [] }: OptionInfo): boolean =>
+  const isOffered = ({ autopilots }: OptionInfo): boolean =>
     autopilot === undefined || autopilots.length === 0 || autopilots.includes(autopilot);
   return options.filter((option) => !PLAIN.has(option.name) && isOffered(option));
 }

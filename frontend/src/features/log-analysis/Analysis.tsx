@@ -121,7 +121,7 @@ function Answer({ title, answer, good, facts, table, label, notes, figures = [],
         </Group>
       </Panel>
       <SimpleGrid
-        className={classes["figures"] ?? ""}
+        className={classes["figures"]}
         type="container"
         cols={{ base: 1, "860px": figures.length }}
         spacing="var(--gap)"

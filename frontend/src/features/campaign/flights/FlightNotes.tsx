@@ -18,7 +18,7 @@ export interface NotePin {
 interface Props {
   trial: Trial;
   /** A new pin adds its line to the note. */
-  pin?: NotePin | null | undefined;
+  pin?: NotePin | null;
 }
 
 /** Note and photos of a flight; a tablet takes photos with its camera. */
@@ -120,7 +120,7 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
         component="textarea"
         ref={text}
         w="100%"
-        classNames={{ input: classes["text"] ?? "" }}
+        classNames={{ input: classes["text"] }}
         description="A line that starts with a time, such as “2.4 s: wobble”, is marked on the record chart."
         multiline
         label={`Note on flight ${trial.number}`}

@@ -71,7 +71,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
           <Group gap={8}>
             {INVALID_REASONS.map((one) => (
-              <Chip key={one} value={one} variant="outline" classNames={{ label: classes["chip"] ?? "" }}>
+              <Chip key={one} value={one} variant="outline" classNames={{ label: classes["chip"] }}>
                 {one}
               </Chip>
             ))}

@@ -86,7 +86,7 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
         )}
         <PromoteGains campaign={campaign} />
         <Note fz="body">A clone is a new campaign with the same settings.</Note>
-        <CloneForm {...campaign} experiment={campaign.definition.experiment ?? ""} bestFlight={bestFlight} />
+        <CloneForm {...campaign} experiment={campaign.definition.experiment} bestFlight={bestFlight} />
         {campaign.actions.includes("archive") && <ArchiveCampaign campaignId={campaign.id} />}
       </Stack>
     </Panel>
@@ -107,7 +107,7 @@ interface ResultProps {
 
 /** The best gains beside the first, each with the mean of all its flights. */
 function Result({ campaign, winner, first, comparison }: ResultProps) {
-  const experiment = campaign.definition.experiment ?? "";
+  const experiment = campaign.definition.experiment;
   const unit = useUnits(experiment).error;
   const change = percentChange(winner.mean, first.mean);
   const standing = campaign.standing && STANDINGS[campaign.standing];

@@ -25,7 +25,7 @@ export function FlightChoices({ proposal, chosen, disabled, onChoose }: Props) {
             value={name}
             disabled={disabled}
             variant="outline"
-            classNames={{ label: classes["choice"] ?? "" }}
+            classNames={{ label: classes["choice"] }}
           >
             {CHOICES[name].label}
             {name === recommended && " (recommended)"}

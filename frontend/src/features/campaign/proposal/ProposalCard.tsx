@@ -42,7 +42,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isReadOnly = useReadOnlyReason(null) !== null;
   const chosen = useChosenFlight(campaign, proposal, onPreview, isReadOnly);
   const { gains, gate, prediction, rows } = chosen;
-  const experiment = campaign.definition.experiment ?? "";
+  const experiment = campaign.definition.experiment;
   const units = useUnits(experiment);
   const hasModel = useHasModel(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
@@ -84,7 +84,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             hasModel={hasModel}
           />
         )}
-        <Stack gap={10} className={classes["later"] ?? ""}>
+        <Stack gap={10} className={classes["later"]}>
           {isEvaluated && prediction.result?.interval && isAgain && group && isPriorScatter(statistics) && (
             <Note>The interval assumes the prior estimate of the scatter: no gain set has two valid flights.</Note>
           )}

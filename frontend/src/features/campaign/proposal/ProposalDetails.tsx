@@ -42,7 +42,7 @@ export function PredictedError({ prediction, best, bestTitle, source, unit, hasM
   const change = percentChange(error, best);
   if (error === null && isCurrent) {
     return (
-      <Note fz="body" className={hasModel ? "" : (classes["later"] ?? "")}>
+      <Note fz="body" className={hasModel ? "" : classes["later"]}>
         {unpredicted(best, hasModel)}
       </Note>
     );
@@ -91,7 +91,7 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
       </Aside>
     );
   }
-  const later = classes["later"] ?? "";
+  const later = classes["later"];
   const { hint } = CHOICES[chosen];
   if (!isStop && !(isRecommended && proposal.gate.passed)) {
     return (
@@ -126,9 +126,9 @@ interface ProposalDetailsProps {
 /** Details of the proposed gains: why these, what the model says of others, and the steps evaluated on it. */
 export function ProposalDetails({ proposal, campaignId, said, unit, hasModel }: ProposalDetailsProps) {
   const { explanation, gains } = proposal;
-  const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
+  const { clipped, notes, lesson, fitted, trust_fraction: trust } = explanation;
   const summary = said.includes(explanation.summary) ? "" : explanation.summary;
-  const isModelled = Object.keys(explanation.gradient ?? {}).length > 0 || fitted.length > 0;
+  const isModelled = Object.keys(explanation.gradient).length > 0 || fitted.length > 0;
   const isExplained = hasModel || notes.length > 0 || lesson !== "" || summary !== "";
   return (
     <>
@@ -197,7 +197,7 @@ interface TriedProps {
 
 /** The gradient, and the steps evaluated along it. */
 function Tried({ explanation, unit, gains }: TriedProps) {
-  const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
+  const { gradient, ladder, chosen_length: chosen } = explanation;
   const slopes = Object.entries(gradient);
   if (slopes.length + ladder.length === 0) return null;
   return (
@@ -225,7 +225,7 @@ function Tried({ explanation, unit, gains }: TriedProps) {
                 <td>{gainText(step.length)}</td>
                 <td>{gainsInBrackets(step.gains)}</td>
                 <td>{withUnit(step.predicted_error, unit)}</td>
-                <td>{step.clipped?.join(", ") || NOTHING}</td>
+                <td>{step.clipped.join(", ") || NOTHING}</td>
               </tr>
             ))}
           </tbody>

@@ -67,7 +67,7 @@ function Results(all: CampaignStatistics) {
 interface FactProps {
   title: string;
   topic?: Topic;
-  tone?: "good" | "bad" | undefined;
+  tone?: "good" | "bad";
   value: string;
   /** What the value is. */
   remark?: string | false;

@@ -229,7 +229,7 @@ const KINDS = {
 
 /** Glitches of the record, and the error without them. The stored record is unchanged. */
 function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
-  const glitches = trial.glitches ?? [];
+  const { glitches } = trial;
   if (glitches.length === 0) return null;
   return (
     <Aside tone="bad" mb={14} fz="small">
@@ -247,7 +247,7 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
           </li>
         ))}
       </ul>
-      {trial.repaired_error !== null && trial.repaired_error !== undefined && (
+      {trial.repaired_error !== null && (
         <p className="numbers">
           Error as recorded <span className="quantity">{plusMinus(trial.error, null, unit)}</span>, with the glitches
           interpolated <span className="quantity">{plusMinus(trial.repaired_error, null, unit)}</span>.

@@ -35,7 +35,7 @@ export function repeatPurpose(trial: Trial): string {
 
 /** Markers of a flight besides its class. */
 export function marksOf(trial: Trial): string[] {
-  const glitches = trial.glitches?.length ?? 0;
+  const glitches = trial.glitches.length;
   return [
     trial.overrule_reason ? "Gate overruled" : "",
     glitches > 0 ? `${glitches} glitch${glitches === 1 ? "" : "es"}` : "",
