@@ -128,10 +128,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
           <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
         </dl>
         <form
-          onSubmit={(event) => {
-            event.preventDefault();
-            edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) });
-          }}
+          action={() => edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) })}
         >
           <Group gap={10} align="flex-end">
             <TextInput

@@ -40,12 +40,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         <LandNow isDown={isDown} orders={orders} flex="1 1 260px" />
         <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching} />
       </Group>
-      <form
-        onSubmit={(event) => {
-          event.preventDefault();
-          release.mutate(statement.trim());
-        }}
-      >
+      <form action={() => release.mutate(statement.trim())}>
         <Group gap={10} align="flex-end">
           <TextInput
             label="Inspected by, and findings"

@@ -9,10 +9,9 @@ import { NumberField, numbersOf } from "../../ui/Fields";
 import { RequestForm } from "../../ui/FormPage";
 import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, RESTORED, safeGainsWritten, sameHeld } from "../../ui/gains";
-import { HelpTip } from "../../ui/HelpTip";
+import { ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
-import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { unknownGainsText, unreadGains, type VehicleForm } from "./fleet";
@@ -46,28 +45,17 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   return (
     <Panel title="Gains">
       <Stack gap={14}>
-        <table className={`${table["table"]} ${classes["table"]}`}>
-          <thead>
-            <tr>
-              <th scope="col">Gain</th>
-              <th scope="col" data-number>
-                Current
-              </th>
-              <th scope="col" data-number>
-                Safe <HelpTip topic="safeGains" />
-              </th>
-            </tr>
-          </thead>
-          <tbody className="numbers">
-            {Object.entries(safe).map(([name, value]) => (
-              <tr key={name}>
-                <th scope="row">{name}</th>
-                <td data-number>{held[name] === undefined ? NOTHING : gainText(held[name])}</td>
-                <td data-number>{gainText(value)}</td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
+        <ListTable
+          label="Current and safe gains"
+          className={classes["table"]}
+          rows={Object.entries(safe)}
+          keyOf={([name]) => name}
+          columns={[
+            { title: "Gain", isHeading: true, cell: ([name]) => name },
+            { title: "Current", cell: ([name]) => (held[name] === undefined ? NOTHING : gainText(held[name])) },
+            { title: "Safe", topic: "safeGains", cell: ([, value]) => gainText(value) },
+          ]}
+        />
         {isKnown && <CheckResult passed={isSafe}>{isCurrent ? now : before}</CheckResult>}
         <Note>
           {isKnown ? (

@@ -4,9 +4,9 @@ import { type ReactNode, useState } from "react";
 import { useActs } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { gainText } from "../../ui/format";
+import { ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
-import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { parametersOf } from "./fleet";
@@ -30,6 +30,14 @@ export function CheckResult({ passed, children }: { passed: boolean; children: R
   );
 }
 
+/** A cell with a remark below it, if any. */
+export const remarked = (what: ReactNode, remark: string | false) => (
+  <>
+    {what}
+    {remark && <small>{remark}</small>}
+  </>
+);
+
 /** All items of the last preflight check; outdated ones are grey. */
 export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle: Vehicle }) {
   if (checks === null) {
@@ -42,36 +50,26 @@ export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle:
   }
   return (
     <>
-      <div
-        className={table["scroll"]}
-        style={state in OUTDATED ? { filter: "grayscale(1)", opacity: 0.75 } : undefined}
-      >
-        <table className={`${table["table"]} ${classes["table"]}`}>
-          <thead>
-            <tr>
-              <th scope="col">Item</th>
-              <th scope="col">Result</th>
-              <th scope="col">Found</th>
-            </tr>
-          </thead>
-          <tbody>
-            {checks.map(({ name, title, passed, found, needed, hint }) => (
-              <tr key={name}>
-                <th scope="row">
-                  {title}
-                  {!passed && hint && <small>{hint}</small>}
-                </th>
-                <td>
-                  <CheckResult passed={passed}>{passed ? "passed" : "failed"}</CheckResult>
-                </td>
-                <td>
-                  {found}
-                  <small>required: {needed}</small>
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
+      <div style={state in OUTDATED ? { filter: "grayscale(1)", opacity: 0.75 } : undefined}>
+        <ListTable
+          label="Preflight checks"
+          className={classes["table"]}
+          rows={checks}
+          keyOf={({ name }) => name}
+          columns={[
+            {
+              title: "Item",
+              isHeading: true,
+              cell: ({ title, passed, hint }) => remarked(title, !passed && hint),
+            },
+            {
+              title: "Result",
+              isText: true,
+              cell: ({ passed }) => <CheckResult passed={passed}>{passed ? "passed" : "failed"}</CheckResult>,
+            },
+            { title: "Found", isText: true, cell: ({ found, needed }) => remarked(found, `required: ${needed}`) },
+          ]}
+        />
       </div>
       <Note>
         Checked <Time at={checked_at} />
@@ -119,21 +117,21 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
               value={wanted}
               onChange={(event) => setWanted(event.currentTarget.value)}
             />
-            {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
-            <section style={{ maxHeight: 420, overflow: "auto" }} aria-label="Parameters" tabIndex={0}>
-              <table className={`${table["table"]} ${classes["table"]}`}>
-                <tbody>
-                  {found.map(([name, value]) => (
-                    <tr key={name}>
-                      <th scope="row">{name}</th>
-                      <td data-number title={String(value)}>
-                        {gainText(value)}
-                      </td>
-                    </tr>
-                  ))}
-                </tbody>
-              </table>
-            </section>
+            <ListTable
+              label="Parameters"
+              framed
+              className={classes["table"]}
+              rows={found}
+              keyOf={([name]) => name}
+              columns={[
+                { title: "Parameter", hidesTitle: true, isHeading: true, cell: ([name]) => name },
+                {
+                  title: "Value",
+                  hidesTitle: true,
+                  cell: ([, value]) => <span title={String(value)}>{gainText(value)}</span>,
+                },
+              ]}
+            />
             <Note>
               Read <Time at={read?.finished_at} />.
             </Note>

@@ -85,18 +85,13 @@ export const ACTS: Record<ActKind, string> = {
   abort: "Abort",
 };
 
-const PURPOSES: Record<GivenGains["purpose"], string> = {
+export const PURPOSES: Record<GivenGains["purpose"], string> = {
   flight: "Flight",
   "restore after flight": "Safe gains after flight",
   connect: "Safe gains at connection",
   restore: "Safe gains, on request",
   release: "Safe gains at release",
 };
-
-/** Purpose of a line of the gain history. */
-export function purposeOf({ purpose, asked }: Pick<GivenGains, "purpose" | "asked">): string {
-  return Object.keys(asked).length === 0 ? "Found at connection, nothing sent" : PURPOSES[purpose];
-}
 
 export function autopilotTitle(catalogue: Catalogue | undefined, { options }: Pick<Vehicle, "options">): string {
   return catalogue?.autopilots.find(({ name }) => name === options["autopilot"])?.label ?? "";

@@ -5,9 +5,8 @@ import { Aside } from "../../../ui/Aside";
 import { against, gainText, NOTHING, percentChange, trueMinus, withUnit } from "../../../ui/format";
 import { gainsInBrackets } from "../../../ui/gains";
 import { HelpTip } from "../../../ui/HelpTip";
+import { ListTable } from "../../../ui/ListTable";
 import { Note } from "../../../ui/Note";
-import { ScrollTable } from "../../../ui/ScrollTable";
-import table from "../../../ui/ScrollTable.module.css";
 import { intervalText, percent, plusMinus } from "../../../ui/uncertainty";
 import { CHOICES, type ChoiceName, isDoubtful } from "./choices";
 import { Landscape } from "./Landscape";
@@ -210,26 +209,19 @@ function Tried({ explanation, unit, gains }: TriedProps) {
         </span>
       )}
       {ladder.length > 0 && (
-        <ScrollTable label="Steps evaluated on the model" className={`${table["numeric"]} ${classes["ladder"]}`}>
-          <thead>
-            <tr>
-              <th scope="col">Step</th>
-              <th scope="col">[{Object.keys(gains).join(" ")}]</th>
-              <th scope="col">Predicted</th>
-              <th scope="col">Limit</th>
-            </tr>
-          </thead>
-          <tbody>
-            {ladder.map((step) => (
-              <tr key={step.length} data-chosen={step.length === chosen || undefined}>
-                <td>{gainText(step.length)}</td>
-                <td>{gainsInBrackets(step.gains)}</td>
-                <td>{withUnit(step.predicted_error, unit)}</td>
-                <td>{step.clipped.join(", ") || NOTHING}</td>
-              </tr>
-            ))}
-          </tbody>
-        </ScrollTable>
+        <ListTable
+          label="Steps evaluated on the model"
+          className={classes["ladder"]}
+          rows={ladder}
+          keyOf={({ length }) => String(length)}
+          marks={({ length }) => ({ "data-chosen": length === chosen || undefined })}
+          columns={[
+            { title: "Step", cell: ({ length }) => gainText(length) },
+            { title: `[${Object.keys(gains).join(" ")}]`, cell: (step) => gainsInBrackets(step.gains) },
+            { title: "Predicted", cell: ({ predicted_error }) => withUnit(predicted_error, unit) },
+            { title: "Limit", cell: ({ clipped }) => clipped.join(", ") || NOTHING },
+          ]}
+        />
       )}
     </More>
   );
