@@ -3,13 +3,14 @@ import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useReadOnlyReason } from "../../../api/access";
 import type { GainSet } from "../../../api/evaluation";
 import type { RecordUpload } from "../../../api/mutations";
+import { formProblem } from "../../../api/problems";
 import { useStatistics } from "../../../api/queries";
 import type { Campaign, CampaignStatistics, Proposal, Trial } from "../../../api/types";
 import { useConnection } from "../../../live/store";
 import { flightsText } from "../../../ui/format";
 import { sameHeld } from "../../../ui/gains";
 import { Note } from "../../../ui/Note";
-import { ErrorNotice, FormErrorNotice } from "../../../ui/Notices";
+import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { useHasModel, useUnits } from "../../../ui/units";
 import { DeleteCampaign, StopCampaign } from "../EndCampaign";
@@ -55,6 +56,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const reference = groupOf(Object.fromEntries(rows.map(({ name, now }) => [name, now])));
   const best = groups.find(({ is_best }) => is_best);
   const isBestOutside = best !== undefined && reference !== undefined && best !== reference;
+  const labels = chosen.entry ? Object.fromEntries(rows.map(({ name }) => [name, name])) : {};
   const isAgain = isRepeat(chosen.name);
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
@@ -90,10 +92,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           )}
           <FlightWindow definition={campaign.definition} />
         </Stack>
-        <FormErrorNotice
-          error={chosen.error}
-          labels={chosen.entry ? Object.fromEntries(rows.map(({ name }) => [name, name])) : {}}
-        />
+        <ErrorNotice error={formProblem(chosen.error, labels)} shown={Object.keys(labels)} />
         {refusal && <GateRefusal gate={refusal} onUse={chosen.entry && chosen.use} />}
         <FlightButtons
           campaign={campaign}
