@@ -12,7 +12,7 @@ import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
-import { STATE_FILTERS, STATES, type StateFilter } from "./campaignList";
+import { STATES, type StateFilter } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
 import { ImportBundle } from "./ImportBundle";
 
@@ -29,12 +29,12 @@ const CARDS = { minColWidth: "min(300px, 100%)", spacing: "var(--gap)" };
 export function CampaignListPage() {
   useTitle("Campaigns");
   const [search, setSearch] = useState("");
-  const [state, setState] = useState<StateFilter>("all");
+  const [state, setState] = useState<StateFilter>("All");
   const [vehicle, setVehicle] = useState("");
   const [sort, setSort] = useState<Sort>("-updated");
   const [sought] = useDebouncedValue(search.trim(), 200);
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
-  const filtered = sought !== "" || state !== "all" || vehicle !== "";
+  const filtered = sought !== "" || state !== "All" || vehicle !== "";
   const campaigns = useCampaigns({ search: sought, state: STATES[state], vehicle: vehicle ? [vehicle] : [], sort });
   const found = campaigns.data?.items ?? [];
   if (campaigns.data?.total === 0 && !filtered) return <FirstCampaign />;
@@ -62,8 +62,8 @@ export function CampaignListPage() {
           aria-label="State"
           size="md"
           value={state}
-          onChange={(value) => setState(value as StateFilter)}
-          data={STATE_FILTERS}
+          onChange={setState}
+          data={Object.keys(STATES) as StateFilter[]}
         />
         <SelectField
           flex="9 1 150px"
@@ -94,7 +94,7 @@ export function CampaignListPage() {
               variant="default"
               onClick={() => {
                 setSearch("");
-                setState("all");
+                setState("All");
                 setVehicle("");
               }}
             >

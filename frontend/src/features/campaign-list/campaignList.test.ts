@@ -36,6 +36,6 @@ test("one flight is no progress yet", () => {
 });
 
 test("archived campaigns are shown only when asked for", () => {
-  expect(STATES.all).not.toContain("archived");
-  expect(STATES.archived).toEqual(["archived"]);
+  expect(STATES.All).not.toContain("archived");
+  expect(STATES.Archived).toEqual(["archived"]);
 });

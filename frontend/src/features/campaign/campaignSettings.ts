@@ -3,23 +3,12 @@
 import type { Campaign, Catalogue, Definition, OptionInfo } from "../../api/types";
 import { count, percentText, unitAfter } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
-
-const STARTS = {
-  default: "The vehicle's default gains",
-  simplex: "Best gains on the model (simplex)",
-  given: "Custom gains",
-  campaign: "Best gains of another campaign",
-} as const;
+import { experimentOf } from "../../ui/units";
+import { STARTS } from "../new-campaign/newCampaign";
 
 const CLOSE_UNITS = ["°", "×"];
 
 type Row = [title: string, value: string];
-
-interface Described {
-  name: string;
-  title: string;
-  unit?: string;
-}
 
 function percent(share: number): string {
   return percentText(100 * share, 1);
@@ -31,7 +20,7 @@ function valueText(value: unknown, unit = ""): string {
 }
 
 /** Options with the titles and units of the catalogue; with their names until it is loaded. */
-function optionRows(options: Record<string, unknown>, known: readonly Described[] = []): Row[] {
+function optionRows(options: Record<string, unknown>, known: readonly OptionInfo[] = []): Row[] {
   return Object.entries(options).map(([name, value]) => {
     const found = known.find((one) => one.name === name);
     return [found?.title ?? name, valueText(value, found?.unit)];
@@ -65,15 +54,9 @@ function startText(start: Definition["start"]): string {
   return start.gains ? gainsInBrackets(start.gains) : STARTS[start.kind];
 }
 
-type Experiment = Catalogue["experiments"][number];
-
-function experimentOf(definition: Definition, catalogue?: Catalogue): Experiment | undefined {
-  return catalogue?.experiments.find(({ name }) => name === definition.experiment);
-}
-
 /** All settings of the experiment: those of the definition, the others at their defaults. */
 function experimentOptions(definition: Definition, catalogue?: Catalogue): Record<string, unknown> {
-  const offered = experimentOf(definition, catalogue)?.options ?? [];
+  const offered = experimentOf(catalogue, definition.experiment)?.options ?? [];
   const defaults = Object.fromEntries(offered.map(({ name, default: standard }) => [name, standard]));
   return { ...defaults, ...definition.experiment_options };
 }
@@ -90,8 +73,8 @@ export function settingsOf(campaign: Campaign, catalogue?: Catalogue): Row[] {
   const { stop, start } = definition;
   const kind = catalogue?.vehicle_kinds.find(({ name }) => name === vehicle.kind);
   const strategy = catalogue?.strategies.find(({ name }) => name === definition.strategy);
-  const experiment = experimentOf(definition, catalogue);
-  const unitOf = (name: string): string => experiment?.gains?.find((gain) => gain.name === name)?.unit ?? "";
+  const experiment = experimentOf(catalogue, definition.experiment);
+  const unitOf = (name: string): string => experiment?.gains.find((gain) => gain.name === name)?.unit ?? "";
   const bounds = Object.entries(definition.bounds);
   const rows: (Row | false)[] = [
     ["Vehicle", vehicle.title],

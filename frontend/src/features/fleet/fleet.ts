@@ -12,32 +12,32 @@ import type {
 } from "../../api/types";
 import type { Aged } from "../../live/vehicleStatus";
 import { type NumberEntry, numbersOf, type OptionValue } from "../../ui/Fields";
-import type { StateLabel } from "../../ui/states";
+import { bad, busy, good, quiet, type StateLabel } from "../../ui/states";
 
 const STATES: Record<VehicleState, StateLabel> = {
-  disconnected: { word: "Not connected", tone: "quiet" },
-  ready: { word: "Ready", tone: "good" },
-  staged: { word: "Staged", tone: "busy" },
-  flying: { word: "In flight", tone: "busy" },
-  quarantined: { word: "Quarantined", tone: "bad" },
+  disconnected: quiet("Not connected"),
+  ready: good("Ready"),
+  staged: busy("Staged"),
+  flying: busy("In flight"),
+  quarantined: bad("Quarantined"),
 };
 
 /** States that are known only while data comes from the vehicle. */
 const REPORTED: ReadonlySet<VehicleState> = new Set<VehicleState>(["ready", "staged", "flying"]);
 
 const SILENCES = {
-  connecting: { word: "Connecting", tone: "busy" },
-  connected: { word: "No data", tone: "bad" },
-  gone: { word: "Link lost", tone: "bad" },
-  "not answering": { word: "Commands blocked", tone: "bad" },
+  connecting: busy("Connecting"),
+  connected: bad("No data"),
+  gone: bad("Link lost"),
+  "not answering": bad("Commands blocked"),
 } as const;
 
 /** A shared vehicle has no permanent connection. `status` is null if the vehicle has none, or it is not known yet. */
 export function vehicleStateLabel(vehicle: Vehicle, status: Aged | null): StateLabel {
   const { state, registered } = vehicle;
-  if (!registered && state === "disconnected") return { word: "No link", tone: "quiet" };
+  if (!registered && state === "disconnected") return quiet("No link");
   if (status !== null && !status.isCurrent && REPORTED.has(state)) return SILENCES[status.status.state];
-  if (state === "ready" && failedChecks(vehicle).length > 0) return { word: "Preflight check failed", tone: "bad" };
+  if (state === "ready" && failedChecks(vehicle).length > 0) return bad("Preflight check failed");
   return STATES[state];
 }
 

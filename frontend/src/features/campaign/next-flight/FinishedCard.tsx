@@ -16,7 +16,6 @@ import { useUnits } from "../../../ui/units";
 import { CloneForm } from "../../new-campaign/CloneForm";
 import { ArchiveCampaign } from "../EndCampaign";
 import { PromoteGains } from "../verdict/PromoteGains";
-import { VERDICTS } from "../verdict/verdict";
 import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
 
 const FURTHER_FLIGHTS = 3;
@@ -128,7 +127,7 @@ function Result({ campaign, winner, first, comparison }: ResultProps) {
           <p>
             {against(change, "the first gains")} ·{" "}
             <strong>
-              {VERDICTS[comparison.verdict].toLowerCase()}
+              {comparison.verdict}
               {comparison.confidence !== null && ` with ${confidenceText(comparison.confidence)} confidence`}
             </strong>
           </p>

@@ -108,7 +108,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
       title="Best vs. baseline"
       topic="difference"
       tone={toneOf(verdict)}
-      value={VERDICTS[verdict]}
+      value={VERDICTS[verdict].word}
       remark={confidence !== null && `${confidenceText(confidence)} confidence`}
     >
       <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}

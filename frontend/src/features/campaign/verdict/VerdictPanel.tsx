@@ -1,5 +1,5 @@
 import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
-import { IconCircleArrowDown, IconCircleArrowUp, IconDownload, IconHelpHexagon, IconRepeat } from "@tabler/icons-react";
+import { IconDownload, IconRepeat } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useCreateTrial } from "../../../api/mutations";
 import { recordCsv, useCampaign, useStatistics } from "../../../api/queries";
@@ -187,13 +187,6 @@ export function VerdictPanel({ trial, trials, pin }: Props) {
   );
 }
 
-const SIGNS = {
-  better: { Icon: IconCircleArrowDown, color: "var(--best)" },
-  worse: { Icon: IconCircleArrowUp, color: "var(--bad)" },
-  unresolved: { Icon: IconHelpHexagon, color: "var(--dim)" },
-  "not known yet": { Icon: IconHelpHexagon, color: "var(--dim)" },
-} as const;
-
 /** Verdicts of the flight's gains against the best before it and against the first. */
 function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; unit: string }) {
   if (trial.comparisons.length === 0) return null;
@@ -201,13 +194,13 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
   return (
     <Stack component="ul" gap={4} mt={8} fz="body" lh={1.4} className="numbers">
       {trial.comparisons.map(({ against, trial_number, verdict, confidence, difference, standard_error }) => {
-        const { Icon, color } = SIGNS[verdict];
+        const { word, Icon, color } = VERDICTS[verdict];
         return (
           <Group key={against} component="li" gap={8} wrap="nowrap" align="start">
             <Icon size={20} color={asked ? "var(--dim)" : color} aria-hidden />
             <span>
-              {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>} vs.
-              flight {trial_number} ({against === "first" ? "first" : best})
+              {asked ? `These gains: ${verdict}` : <strong>{word}</strong>} vs. flight {trial_number} (
+              {against === "first" ? "first" : best})
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}
               {difference < 0 ? "lower" : "higher"}{" "}

@@ -1,13 +1,15 @@
 /** Texts and decisions about the result of a flight. */
 
+import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import type { Campaign, Trial } from "../../../api/types";
 import { wasFlown } from "../../../ui/states";
 
+/** Word and sign of a verdict. */
 export const VERDICTS = {
-  better: "Better",
-  worse: "Worse",
-  unresolved: "Unresolved",
-  "not known yet": "Not known yet",
+  better: { word: "Better", Icon: IconCircleArrowDown, color: "var(--best)" },
+  worse: { word: "Worse", Icon: IconCircleArrowUp, color: "var(--bad)" },
+  unresolved: { word: "Unresolved", Icon: IconHelpHexagon, color: "var(--dim)" },
+  "not known yet": { word: "Not known yet", Icon: IconHelpHexagon, color: "var(--dim)" },
 } as const;
 
 /** Position of the error relative to its predicted interval; null if one is missing. */
