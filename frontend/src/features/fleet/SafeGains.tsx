@@ -15,12 +15,12 @@ import { Panel } from "../../ui/Panel";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { unknownGainsText, unreadGains, type VehicleForm } from "./fleet";
-import { CheckResult } from "./VehicleReadings";
+import { type ButtonRequest, CheckResult } from "./VehicleReadings";
 
 interface Props {
   vehicle: Vehicle;
-  restoring: boolean;
-  onRestore: () => void;
+  /** Props of the button that restores them. */
+  restore: ButtonRequest;
 }
 
 /** The current gains against the safe gains, while data comes from the vehicle and after. */
@@ -31,7 +31,7 @@ const DIFFERENT = [
 ];
 
 /** The vehicle's current gains next to its safe gains. */
-export function SafeGains({ vehicle, restoring, onRestore }: Props) {
+export function SafeGains({ vehicle, restore }: Props) {
   const [entered, setEntered] = useState<Record<string, number>>();
   const status = useVehicleStatus(vehicle.id);
   const { safe_gains: safe } = vehicle;
@@ -69,7 +69,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           {mayRestore && isArmed(status) && " They can be restored on request once its motors have stopped."}
         </Note>
         <Group gap={10}>
-          <Button variant="default" disabled={!mayRestore || isArmed(status)} loading={restoring} onClick={onRestore}>
+          <Button variant="default" disabled={!mayRestore || isArmed(status)} {...restore}>
             Restore safe gains
           </Button>
           {isKnown && !isSafe && (

@@ -37,6 +37,9 @@ function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> 
   const ledger = useLedger(vehicle.id);
   const lines = ledger.data?.items ?? [];
   const names = Object.keys(vehicle.safe_gains);
+  const written = (gains: GivenGains["asked"], className = "") => (
+    <span className={`quantity ${className}`}>{gainsInBrackets(gains, names)}</span>
+  );
   return (
     <Panel title="Gain history" className={classes["wide"]}>
       <ErrorNotice error={ledger.error} />
@@ -53,19 +56,15 @@ function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> 
             {
               title: `Sent ${names.join(", ")}`,
               isText: true,
-              cell: ({ asked }) => (isSent(asked) ? gainsInBrackets(asked, names) : NOTHING),
+              cell: ({ asked }) => (isSent(asked) ? written(asked) : NOTHING),
             },
             {
               title: "Read back",
               isText: true,
               cell: ({ read_back, asked }) =>
-                read_back === null ? (
-                  NOTHING
-                ) : (
-                  <span className={isSent(asked) && !sameHeld(read_back, asked) ? classes["differs"] : ""}>
-                    {gainsInBrackets(read_back, names)}
-                  </span>
-                ),
+                read_back === null
+                  ? NOTHING
+                  : written(read_back, isSent(asked) && !sameHeld(read_back, asked) ? classes["differs"] : ""),
             },
             { title: "Outcome", isText: true, cell: ({ outcome }) => outcome },
           ]}

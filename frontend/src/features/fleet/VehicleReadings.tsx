@@ -19,6 +19,12 @@ const OUTDATED: Partial<Record<Vehicle["state"], string>> = {
 
 const STEPS_REQUIRE = "Altitude steps require more, which is checked before each such flight.";
 
+/** Sends a request when pressed, and shows that it is under way. */
+export interface ButtonRequest {
+  loading: boolean;
+  onClick: () => void;
+}
+
 /** Result of a check in words, with its colour and icon. */
 export function CheckResult({ passed, children }: { passed: boolean; children: ReactNode }) {
   const Icon = passed ? IconCircleCheck : IconAlertTriangle;
@@ -82,25 +88,25 @@ export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle:
 interface Props {
   vehicleId: number;
   mayRead: boolean;
-  reading: boolean;
-  onRead: () => void;
+  /** Props of the button that reads them. */
+  read: ButtonRequest;
 }
 
 /** All parameters of the vehicle, as last read. */
-export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
+export function ParameterPanel({ vehicleId, mayRead, read }: Props) {
   const [wanted, setWanted] = useState("");
   const acts = useActs(vehicleId).data?.items ?? [];
   const latest = acts.find(({ kind }) => kind === "parameters");
-  const read = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
+  const done = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
   const underWay = latest?.state === "requested" || latest?.state === "running";
-  const parameters = parametersOf(read?.result ?? null);
+  const parameters = parametersOf(done?.result ?? null);
   const found = parameters.filter(([name]) => name.toLowerCase().includes(wanted.trim().toLowerCase()));
   return (
     <Panel
       title="Parameters"
       className={classes["wide"]}
       tools={
-        <Button variant="default" disabled={!mayRead || underWay} loading={reading || underWay} onClick={onRead}>
+        <Button variant="default" {...read} disabled={!mayRead || underWay} loading={read.loading || underWay}>
           Read parameters
         </Button>
       }
@@ -133,7 +139,7 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
               ]}
             />
             <Note>
-              Read <Time at={read?.finished_at} />.
+              Read <Time at={done?.finished_at} />.
             </Note>
           </>
         )}
