@@ -1,4 +1,4 @@
-import { Checkbox, InputBase, type InputBaseProps, TextInput, type TextInputProps } from "@mantine/core";
+import { Checkbox, NativeSelect, type NativeSelectProps, TextInput, type TextInputProps } from "@mantine/core";
 import { IconChevronDown } from "@tabler/icons-react";
 import { useState } from "react";
 import { inPercent } from "../api/problems";
@@ -142,33 +142,21 @@ export function OptionField({ option, value, onChange, ...props }: OptionFieldPr
   );
 }
 
-interface SelectFieldProps<Value extends string> extends InputBaseProps {
-  "aria-label"?: string;
+interface SelectFieldProps<Value extends string> extends Omit<NativeSelectProps, "data" | "value" | "onChange"> {
   data: readonly { value: Value; label: string }[];
   value?: NoInfer<Value>;
   onChange: (value: Value) => void;
 }
 
 /** Native select: large on touch screens, and accessible to screen readers. */
-export function SelectField<Value extends string>({ data, onChange, ...props }: SelectFieldProps<Value>) {
+export function SelectField<Value extends string>({ onChange, ...props }: SelectFieldProps<Value>) {
   return (
-    <InputBase
-      component="select"
-      pointer
+    <NativeSelect
+      size="md"
       rightSection={<IconChevronDown size={18} aria-hidden />}
-      rightSectionPointerEvents="none"
       inputWrapperOrder={["label", "input", "description", "error"]}
-      onChange={(event) => {
-        const chosen = data.find(({ value }) => value === event.currentTarget.value);
-        if (chosen !== undefined) onChange(chosen.value);
-      }}
+      onChange={({ currentTarget }) => onChange(currentTarget.value as Value)}
       {...props}
-    >
-      {data.map(({ value, label }) => (
-        <option key={value} value={value}>
-          {label}
-        </option>
-      ))}
-    </InputBase>
+    />
   );
 }
