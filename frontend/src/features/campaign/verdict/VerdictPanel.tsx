@@ -25,7 +25,7 @@ import { standingWithout } from "../flights/review";
 import { comparisonAddress } from "../flights/useSelectedFlights";
 import { scrollUpOnceBegun } from "../next-flight/nextStep";
 import { useSpeed } from "../next-flight/speed";
-import { scatterMeaning } from "../statistics/scatter";
+import { isPriorScatter } from "../statistics/scatter";
 import { PromoteGains } from "./PromoteGains";
 import classes from "./VerdictPanel.module.css";
 import { bestBeforeOf, bestBeforeTitle, comparedWith, isScored, repeatPurpose, sentenceOf, VERDICTS } from "./verdict";
@@ -98,7 +98,11 @@ export function VerdictPanel({ trial, trials, pin }: Props) {
           value={
             <>
               {plusMinus(trial.error, scatter, unit)}{" "}
-              {statistics && scatter ? <small>({scatterMeaning(statistics)})</small> : null}
+              {statistics && scatter ? (
+                <small>
+                  (± {isPriorScatter(statistics) ? "prior estimate of the scatter" : "flight-to-flight scatter"})
+                </small>
+              ) : null}
             </>
           }
         />
