@@ -85,7 +85,7 @@ export function GateRefusal({ gate, onUse }: RefusalProps) {
   const limits = sentencesOf(offering);
   const others = reasons.filter((reason) => !limits.includes(reason));
   return (
-    <div className={notices["trouble"]} role="alert">
+    <div className={notices["notice"]} role="alert">
       <Stack gap={14} flex={1} miw={0}>
         <div>
           <strong>The gate refuses these gains.</strong>
