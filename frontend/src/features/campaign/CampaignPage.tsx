@@ -1,7 +1,7 @@
 import { Group, SimpleGrid, Skeleton, Tabs } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
 import { flushSync } from "react-dom";
-import { useParams } from "react-router";
+import { useParams, useSearchParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";
@@ -21,7 +21,6 @@ import { NextFlightCard } from "./next-flight/NextFlightCard";
 import type { Preview } from "./proposal/useChosenFlight";
 import { StatisticsPanel } from "./statistics/StatisticsPanel";
 import { useCampaignStatus } from "./useCampaignStatus";
-import { useTab } from "./useTab";
 import { VerdictPanel } from "./verdict/VerdictPanel";
 import { shownTrial } from "./verdict/verdict";
 
@@ -59,6 +58,18 @@ function Coming({ campaignId }: { campaignId: number }) {
       </Group>
     </div>
   );
+}
+
+const TABS = ["trends", "flights", "statistics"] as const;
+
+/** The open tab of a campaign's page, kept in the address so that going back and reloading show it again; the first for
+ * an address that names none of them. */
+function useTab(): [string, (tab: string | null) => void] {
+  const [params, setParams] = useSearchParams();
+  const tab = TABS.find((one) => one === params.get("tab")) ?? TABS[0];
+  const open = (value: string | null): void =>
+    setParams(value === null || value === TABS[0] ? {} : { tab: value }, { replace: true, preventScrollReset: true });
+  return [tab, open];
 }
 
 const NONE: readonly Trial[] = [];

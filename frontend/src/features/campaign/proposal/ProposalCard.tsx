@@ -1,4 +1,4 @@
-import { Button, Stack } from "@mantine/core";
+import { Button, Chip, Group, Stack } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useReadOnlyReason } from "../../../api/access";
 import type { GainSet } from "../../../api/evaluation";
@@ -18,8 +18,7 @@ import { ImportRecord } from "../flights/ImportRecord";
 import { FlightWindow, GroundedNote, useGroundedReason } from "../next-flight/BeforeFlight";
 import { SpeedSwitch, useSpeed } from "../next-flight/speed";
 import { isPriorScatter } from "../statistics/scatter";
-import { isDoubtful, isRepeat, repeatSource } from "./choices";
-import { FlightChoices } from "./FlightChoices";
+import { CHOICES, type ChoiceName, isDoubtful, isRepeat, repeatSource } from "./choices";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal, OverruleGate } from "./Gate";
 import classes from "./Proposal.module.css";
@@ -120,6 +119,39 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         {campaign.actions.includes("delete") && <DeleteCampaign campaign={campaign} />}
       </Stack>
     </Panel>
+  );
+}
+
+interface ChoicesProps {
+  proposal: Proposal;
+  chosen: ChoiceName;
+  disabled: boolean;
+  onChoose: (choice: ChoiceName) => void;
+}
+
+/** One choice of what to fly next. */
+function FlightChoices({ proposal, chosen, disabled, onChoose }: ChoicesProps) {
+  const recommended = proposal.choices.find(
+    (choice) => choice.recommended && (!choice.proposed || proposal.gate.passed),
+  )?.kind;
+  return (
+    <Chip.Group value={chosen} onChange={(name) => onChoose(name as ChoiceName)}>
+      <Group gap={8} role="radiogroup" aria-label="Gains to fly">
+        {[...proposal.choices.map(({ kind }) => kind), "own" as const].map((name) => (
+          <Chip
+            key={name}
+            name="gains-to-fly"
+            value={name}
+            disabled={disabled}
+            variant="outline"
+            classNames={{ label: classes["choice"] }}
+          >
+            {CHOICES[name].label}
+            {name === recommended && " (recommended)"}
+          </Chip>
+        ))}
+      </Group>
+    </Chip.Group>
   );
 }
 
