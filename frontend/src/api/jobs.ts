@@ -20,7 +20,7 @@ export type { Job, JobState, ReproductionSummary, Row as ReproductionRow } from 
 
 export const JOBS_PAGE = 20;
 
-export function useJobs(state: readonly JobState[], limit = JOBS_PAGE) {
+export function useJobs(state: readonly JobState[], limit: number) {
   return usePages(["jobs", ...state, limit], limit, (page) =>
     answer(listJobs({ query: { state: [...state], ...page } })),
   );

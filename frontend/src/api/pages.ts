@@ -2,7 +2,7 @@
 
 import { type InfiniteData, keepPreviousData, type QueryKey, useInfiniteQuery } from "@tanstack/react-query";
 
-export interface Page<Item> {
+interface Page<Item> {
   items: Item[];
   total: number;
   next_cursor: string | null;

@@ -152,7 +152,6 @@ interface SelectFieldProps<Value extends string> extends Omit<NativeSelectProps,
 export function SelectField<Value extends string>({ onChange, ...props }: SelectFieldProps<Value>) {
   return (
     <NativeSelect
-      size="md"
       rightSection={<IconChevronDown size={18} aria-hidden />}
       inputWrapperOrder={["label", "input", "description", "error"]}
       onChange={({ currentTarget }) => onChange(currentTarget.value as Value)}

@@ -85,11 +85,11 @@ interface Props {
   status: Aged | null;
   orders: ReturnType<typeof useVehicleCommands>;
   /** Whether this browser has read-only access, which disables the control. */
-  watching?: boolean;
+  watching: boolean;
 }
 
 /** Emergency stop of the motors, separate from other controls. */
-export function MotorsOff({ vehicle, status, orders, watching = false }: Props) {
+export function MotorsOff({ vehicle, status, orders, watching }: Props) {
   const asked = vehicle.actions.includes("motors off") || status?.status.armed === true;
   const enabled = asked && !watching;
   return (
