@@ -8,7 +8,7 @@ test.each<
   ["progress is told against the first gains", 0.0933, 5, "better", "71\u00a0% below the first gains"],
   ["the first gains themselves are no progress", 0.3267, 3, null, "no improvement yet"],
   [
-    "a difference within the noise is none that could be claimed",
+    "a difference within the noise is no progress that could be claimed",
     0.32,
     5,
     "unresolved",
