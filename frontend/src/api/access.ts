@@ -7,36 +7,36 @@ import type { Access } from "./types";
 
 const LOOK_AGAIN_MS = 5000;
 
-/** Polled until unlocked, because the unlock link is opened in another tab. */
-function useAccess() {
-  return useQuery({
+/** What is said of the access, null before it is known. Polled until unlocked, because the unlock link is opened in
+ * another tab. */
+function useAccess(say: (access: Access) => string | null): string | null {
+  const { data = null } = useQuery({
     queryKey: ["access"],
     queryFn: () => answer(getAccess()),
     staleTime: 0,
     refetchOnWindowFocus: "always",
     refetchInterval: ({ state }) => (state.data?.hint ? LOOK_AGAIN_MS : false),
-  }).data;
+    select: say,
+  });
+  return data;
 }
 
 /** Why this browser has read-only access to the vehicle, or to the server if null; null if it may act. */
 export function useReadOnlyReason(vehicle: WatchedVehicle | null): string | null {
-  const access = useAccess();
-  return access === undefined ? null : readOnlyReason(access, vehicle);
+  return useAccess((access) => readOnlyReason(access, vehicle));
 }
 
 /** What the unlock link that was opened permits; null before the answer. */
 export function useUnlocked(): string | null {
-  const access = useAccess();
-  if (access === undefined || !access.may_change) return null;
-  return access.may_command
-    ? "This browser may now command real vehicles."
-    : "This browser may now change campaigns and fly simulated vehicles.";
+  return useAccess(({ may_change, may_command }) => {
+    if (may_command) return "This browser may now command real vehicles.";
+    return may_change ? "This browser may now change campaigns and fly simulated vehicles." : null;
+  });
 }
 
 /** Why this browser may not register such a vehicle; null if it may. */
 export function useRegistrationRefusal(isReal: boolean): string | null {
-  const access = useAccess();
-  return access === undefined ? null : registrationRefusal(access, isReal);
+  return useAccess((access) => registrationRefusal(access, isReal));
 }
 
 export function registrationRefusal(access: Access, isReal: boolean): string | null {

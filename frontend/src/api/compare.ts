@@ -3,7 +3,7 @@
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { answer } from "./client";
 import { compareFlights, getComparisonFigure } from "./generated";
-import type { Theme } from "./queries";
+import { type Theme, useFigure } from "./queries";
 
 export type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "./generated";
 
@@ -20,13 +20,8 @@ export function comparisonFigure(trials: readonly number[], theme: Theme) {
   return answer(getComparisonFigure({ query: { trial: [...trials], theme } }));
 }
 
-export function useComparisonFigure(trials: readonly number[], theme: Theme) {
-  return useQuery({
-    queryKey: ["campaigns", "compared", trials, "figure", theme],
-    queryFn: () => comparisonFigure(trials, theme),
-    enabled: trials.length > 1,
-    placeholderData: keepPreviousData,
-  });
+export function useComparisonFigure(trials: readonly number[]) {
+  return useFigure(["campaigns", "compared", trials, "figure"], (theme) => comparisonFigure(trials, theme));
 }
 
 /** The flights in an address, of which the first is the reference, and the campaign whose flights are listed first. */

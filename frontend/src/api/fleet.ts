@@ -1,6 +1,6 @@
 /** Registration, requests and gain history of vehicles. */
 
-import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
+import { useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
 import {
   checkVehicle,
@@ -19,6 +19,7 @@ import {
   type VehicleEdit,
 } from "./generated";
 import { controlHeader } from "./leases";
+import { usePages } from "./pages";
 import { useVehicleChanged } from "./vehicles";
 
 const SHOWN = 20;
@@ -79,24 +80,16 @@ export function useVehicleRequest(vehicleId: number) {
   return useRequest(vehicleId, (act: VehicleRequest, to) => answer(ACTS[act](to)));
 }
 
-/** A paged list, newest first. */
-function useNewest<Page extends { next_cursor: string | null }>(
-  vehicleId: number,
-  list: string,
-  read: (query: { limit: number; cursor?: string }) => Promise<Page>,
-) {
-  return useInfiniteQuery({
-    queryKey: ["vehicle", vehicleId, list],
-    queryFn: ({ pageParam }) => read({ limit: SHOWN, ...(pageParam === null ? {} : { cursor: pageParam }) }),
-    initialPageParam: null as string | null,
-    getNextPageParam: ({ next_cursor }) => next_cursor,
-  });
-}
-
+/** What was asked of the vehicle, newest first. */
 export function useActs(vehicleId: number) {
-  return useNewest(vehicleId, "acts", (query) => answer(listActs({ path: { vehicle_id: vehicleId }, query })));
+  return usePages(["vehicle", vehicleId, "acts"], SHOWN, (query) =>
+    answer(listActs({ path: { vehicle_id: vehicleId }, query })),
+  );
 }
 
+/** The gains given to the vehicle, newest first. */
 export function useLedger(vehicleId: number) {
-  return useNewest(vehicleId, "ledger", (query) => answer(listGivenGains({ path: { vehicle_id: vehicleId }, query })));
+  return usePages(["vehicle", vehicleId, "ledger"], SHOWN, (query) =>
+    answer(listGivenGains({ path: { vehicle_id: vehicleId }, query })),
+  );
 }

@@ -1,6 +1,6 @@
 /** Numeric jobs, among them the reproductions of the paper. */
 
-import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { keepPreviousData, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
 import {
   cancelJob,
@@ -13,21 +13,17 @@ import {
   retryJob,
   runReproduction,
 } from "./generated";
-import type { Theme } from "./queries";
+import { usePages } from "./pages";
+import { useFigure } from "./queries";
 
 export type { Job, JobState, ReproductionSummary, Row as ReproductionRow } from "./generated";
 
 export const JOBS_PAGE = 20;
 
-export function useJobs(state: readonly JobState[], limit = JOBS_PAGE) {
-  return useInfiniteQuery({
-    queryKey: ["jobs", ...state, limit],
-    queryFn: ({ pageParam }) =>
-      answer(listJobs({ query: { state: [...state], limit, ...(pageParam ? { cursor: pageParam } : {}) } })),
-    initialPageParam: "",
-    getNextPageParam: (page) => page.next_cursor,
-    placeholderData: keepPreviousData,
-  });
+export function useJobs(state: readonly JobState[], limit: number) {
+  return usePages(["jobs", ...state, limit], limit, (page) =>
+    answer(listJobs({ query: { state: [...state], ...page } })),
+  );
 }
 
 /** The worker's log of a job; refetched with the jobs. */
@@ -53,13 +49,12 @@ export function useReproductionResult(name: string, jobId: number | null) {
   });
 }
 
-export function useReproductionFigure(name: string, figure: string, theme: Theme, jobId: number) {
-  return useQuery({
-    queryKey: ["reproduction", name, "figure", figure, theme, jobId],
-    queryFn: () => answer(getReproductionFigure({ path: { name, figure }, query: { theme } })),
-    placeholderData: keepPreviousData,
-    staleTime: Infinity,
-  });
+export function useReproductionFigure(name: string, figure: string, jobId: number) {
+  return useFigure(
+    ["reproduction", name, "figure", figure, jobId],
+    (theme) => answer(getReproductionFigure({ path: { name, figure }, query: { theme } })),
+    { staleTime: Infinity },
+  );
 }
 
 /** A request that changes jobs. */

@@ -1,11 +1,14 @@
 /** All mutations. The event stream invalidates queries; responses are stored in the cache immediately. */
 
-import { type MutationFunctionContext, useMutation, useQueryClient } from "@tanstack/react-query";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
 import { answer } from "./client";
 import {
+  type AbortJudgement,
   archiveCampaign,
   type Campaign,
+  type Classification,
+  type Clone,
   cancelTrial,
   classifyTrial,
   cloneCampaign,
@@ -31,95 +34,75 @@ import { controlHeader } from "./leases";
 import type { RecordFiles } from "./records";
 import { useVehicleChanged } from "./vehicles";
 
-/** Store a campaign that the server answered with. */
-function keepCampaign(campaign: Campaign, _sent: unknown, _before: unknown, { client }: MutationFunctionContext): void {
-  client.setQueryData(["campaign", campaign.id], campaign);
-  void client.invalidateQueries({ queryKey: ["campaigns"] });
-}
-
-/** Store a trial that the server answered with; everything else of its campaign follows from it. */
-function keepTrial(
-  trial: Trial,
-  _sent: unknown,
-  _before: unknown,
-  { client }: MutationFunctionContext,
-): Promise<unknown> {
-  client.setQueryData(["trial", trial.id], trial);
-  return Promise.all([
-    client.invalidateQueries({ queryKey: ["campaign", trial.campaign_id] }),
-    client.invalidateQueries({ queryKey: ["flying"] }),
-  ]);
-}
-
 /** Has all that is shown of campaigns read again. */
 function useStaleCampaigns() {
   const queries = useQueryClient();
   return () => queries.invalidateQueries({ queryKey: ["campaign"] });
 }
 
-export function useCreateCampaign() {
+/** A request that is answered with a campaign, which is stored. */
+function useCampaignRequest<Sent>(send: (sent: Sent) => Promise<Campaign>) {
   return useMutation({
-    mutationFn: (body: NewCampaignInput) => answer(createCampaign({ body })),
-    onSuccess: keepCampaign,
+    mutationFn: send,
+    onSuccess: (campaign, _sent, _before, { client }) => {
+      client.setQueryData(["campaign", campaign.id], campaign);
+      void client.invalidateQueries({ queryKey: ["campaigns"] });
+    },
+    onSettled: useStaleCampaigns(),
   });
+}
+
+/** A request that is answered with a trial, which is stored; everything else of its campaign follows from it. */
+function useTrialRequest<Sent>(send: (sent: Sent) => Promise<Trial>, onStored?: (trial: Trial, sent: Sent) => void) {
+  return useMutation({
+    mutationFn: send,
+    onSuccess: (trial, sent, _before, { client }) => {
+      onStored?.(trial, sent);
+      client.setQueryData(["trial", trial.id], trial);
+      return Promise.all([
+        client.invalidateQueries({ queryKey: ["campaign", trial.campaign_id] }),
+        client.invalidateQueries({ queryKey: ["flying"] }),
+      ]);
+    },
+    onError: useStaleCampaigns(),
+  });
+}
+
+export function useCreateCampaign() {
+  return useCampaignRequest((body: NewCampaignInput) => answer(createCampaign({ body })));
 }
 
 /** Plan a trial of a proposal or of manual gains, and fly it if the body requests it; otherwise open the fly screen of
  * a registered vehicle. Navigates here because the calling card is unmounted as soon as the trial is known. */
 export function useCreateTrial({ id, vehicle }: Campaign) {
   const navigate = useNavigate();
-  return useMutation({
-    mutationFn: (body: NewTrial) =>
-      answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
-    onSuccess: (trial, sent, before, context) => {
-      if (vehicle.registered && !sent.fly) void navigate(`/fly/${trial.id}`);
-      return keepTrial(trial, sent, before, context);
-    },
-    onError: useStaleCampaigns(),
-  });
+  return useTrialRequest(
+    (body: NewTrial) => answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
+    (trial, { fly }) => vehicle.registered && !fly && void navigate(`/fly/${trial.id}`),
+  );
 }
 
 export function useFlyTrial({ vehicle }: Campaign) {
-  return useMutation({
-    mutationFn: ({ trialId, speed }: { trialId: number; speed: number | null }) =>
-      answer(flyTrial({ path: { trial_id: trialId }, body: { speed }, headers: controlHeader(vehicle.id) })),
-    onSuccess: keepTrial,
-    onError: useStaleCampaigns(),
-  });
+  return useTrialRequest(({ trialId, speed }: { trialId: number; speed: number | null }) =>
+    answer(flyTrial({ path: { trial_id: trialId }, body: { speed }, headers: controlHeader(vehicle.id) })),
+  );
 }
 
 export function useCancelTrial() {
-  return useMutation({
-    mutationFn: (trialId: number) => answer(cancelTrial({ path: { trial_id: trialId } })),
-    onSuccess: keepTrial,
-  });
+  return useTrialRequest((trialId: number) => answer(cancelTrial({ path: { trial_id: trialId } })));
 }
 
-export interface ClassificationInput {
-  trial: Trial;
-  outcome: "valid" | "aborted" | "invalid";
-  reason: string;
+export function useClassify({ id, version }: Trial) {
+  return useTrialRequest((review: Omit<Classification, "version">) =>
+    answer(classifyTrial({ path: { trial_id: id }, body: { version, ...review } })),
+  );
 }
-
-export function useClassify() {
-  return useMutation({
-    mutationFn: ({ trial, outcome, reason }: ClassificationInput) =>
-      answer(classifyTrial({ path: { trial_id: trial.id }, body: { version: trial.version, outcome, reason } })),
-    onSuccess: keepTrial,
-    onError: useStaleCampaigns(),
-  });
-}
-
-export type AbortJudgementInput = "behaved badly" | "something else";
 
 /** Why the operator aborted a flight. */
-export function useJudgeAbort() {
-  return useMutation({
-    mutationFn: ({ trial, cause }: { trial: Trial; cause: AbortJudgementInput }) =>
-      answer(judgeAbort({ path: { trial_id: trial.id }, body: { version: trial.version, cause } })),
-    onSuccess: keepTrial,
-    onError: useStaleCampaigns(),
-  });
+export function useJudgeAbort({ id, version }: Trial) {
+  return useTrialRequest((cause: AbortJudgement["cause"]) =>
+    answer(judgeAbort({ path: { trial_id: id }, body: { version, cause } })),
+  );
 }
 
 export interface RecordOrder extends RecordFiles {
@@ -135,22 +118,17 @@ export interface RecordOrder extends RecordFiles {
 
 /** Upload the record of a flight made elsewhere: of a planned trial, or with the trial to plan. */
 export function useUploadRecord(campaignId: number) {
-  return useMutation({
-    mutationFn: ({ file, companion, trialId, plan, ...query }: RecordOrder) => {
-      const files = { file, ...(companion === undefined ? {} : { companion }) };
-      return answer(
-        trialId === undefined
-          ? importFlight({
-              path: { campaign_id: campaignId },
-              query,
-              body: { ...files, trial: JSON.stringify(plan ?? {}) },
-            })
-          : uploadTrajectory({ path: { trial_id: trialId }, query, body: files }),
-      );
-    },
-    onSuccess: keepTrial,
-    onError: useStaleCampaigns(),
-  });
+  return useTrialRequest(({ file, companion, trialId, plan = {}, ...query }: RecordOrder) =>
+    answer(
+      trialId === undefined
+        ? importFlight({
+            path: { campaign_id: campaignId },
+            query,
+            body: { file, companion, trial: JSON.stringify(plan) },
+          })
+        : uploadTrajectory({ path: { trial_id: trialId }, query, body: { file, companion } }),
+    ),
+  );
 }
 
 export type RecordUpload = ReturnType<typeof useUploadRecord>;
@@ -163,10 +141,7 @@ export function useRecompute(campaignId: number) {
 }
 
 export function useFinish(campaignId: number) {
-  return useMutation({
-    mutationFn: () => answer(finishCampaign({ path: { campaign_id: campaignId }, body: {} })),
-    onSuccess: keepCampaign,
-  });
+  return useCampaignRequest(() => answer(finishCampaign({ path: { campaign_id: campaignId }, body: {} })));
 }
 
 /** Delete a campaign that has not flown. */
@@ -182,11 +157,7 @@ export function useDeleteCampaign({ id, version }: Campaign, onDeleted: () => vo
 
 /** Create the campaign that rehearses this one on a simulation. */
 export function useRehearse(campaignId: number) {
-  return useMutation({
-    mutationFn: () => answer(rehearseCampaign({ path: { campaign_id: campaignId } })),
-    onSuccess: keepCampaign,
-    onSettled: useStaleCampaigns(),
-  });
+  return useCampaignRequest(() => answer(rehearseCampaign({ path: { campaign_id: campaignId } })));
 }
 
 /** Set the best gains as the safe gains of the campaign's registered vehicle. */
@@ -201,43 +172,20 @@ export function usePromote({ id, vehicle }: Campaign) {
 
 /** Continue a finished campaign for some flights, of which `plan` lists those that are planned at once, in order. */
 export function useReopen(campaignId: number) {
-  return useMutation({
-    mutationFn: (body: Reopening) => answer(reopenCampaign({ path: { campaign_id: campaignId }, body })),
-    onSettled: useStaleCampaigns(),
-  });
+  return useCampaignRequest((body: Reopening) => answer(reopenCampaign({ path: { campaign_id: campaignId }, body })));
 }
 
 export function useArchive(campaignId: number) {
-  return useMutation({
-    mutationFn: () => answer(archiveCampaign({ path: { campaign_id: campaignId } })),
-    onSuccess: keepCampaign,
-  });
+  return useCampaignRequest(() => answer(archiveCampaign({ path: { campaign_id: campaignId } })));
 }
 
-export interface Cloning {
-  /** Another vehicle; without it the same one with its settings. */
-  vehicle?: NonNullable<NewCampaignInput["vehicle"]>;
-  warmStart: boolean;
-}
-
+/** Without a vehicle, the same one with its settings. */
 export function useClone(campaignId: number) {
-  return useMutation({
-    mutationFn: ({ vehicle, warmStart }: Cloning) =>
-      answer(
-        cloneCampaign({
-          path: { campaign_id: campaignId },
-          body: { warm_start: warmStart, ...(vehicle === undefined ? {} : { vehicle }) },
-        }),
-      ),
-    onSuccess: keepCampaign,
-  });
+  return useCampaignRequest((body: Clone) => answer(cloneCampaign({ path: { campaign_id: campaignId }, body })));
 }
 
 export function useRename(campaign: Campaign) {
-  return useMutation({
-    mutationFn: (name: string) =>
-      answer(editCampaign({ path: { campaign_id: campaign.id }, body: { version: campaign.version, name } })),
-    onSuccess: keepCampaign,
-    onError: useStaleCampaigns(),
-  });
+  return useCampaignRequest((name: string) =>
+    answer(editCampaign({ path: { campaign_id: campaign.id }, body: { version: campaign.version, name } })),
+  );
 }

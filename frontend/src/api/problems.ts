@@ -23,31 +23,29 @@ export class ApiError extends Error {
   }
 }
 
-const UNREACHABLE: Problem = {
-  status: 0,
-  title: "The server is not responding.",
-  detail: "The request may or may not have been received.",
-  hint: "Check that Gainline is running and that the network is up. The page updates automatically. Before you try again, see whether the request took effect.",
-  problems: [],
-};
+/** A problem without an answer of the server. */
+export function localProblem(title: string, detail = "", hint = ""): Problem {
+  return { status: 0, title, detail, hint, problems: [] };
+}
+
+const UNREACHABLE = localProblem(
+  "The server is not responding.",
+  "The request may or may not have been received.",
+  "Check that Gainline is running and that the network is up. The page updates automatically. Before you try again, see whether the request took effect.",
+);
 
 /** Gainline was updated, or the server was lost, after this tab was opened. */
-export const PAGE_MISSING: Problem = {
-  status: 0,
-  title: "This page could not be loaded.",
-  detail:
-    "The server is unreachable, or it was updated after this tab was opened. Flights continue; nothing was changed.",
-  hint: "Try again. The page loads automatically when the server is back.",
-  problems: [],
-};
+export const PAGE_MISSING = localProblem(
+  "This page could not be loaded.",
+  "The server is unreachable, or it was updated after this tab was opened. Flights continue; nothing was changed.",
+  "Try again. The page loads automatically when the server is back.",
+);
 
-export const BROKEN_PAGE: Problem = {
-  status: 0,
-  title: "This page could not be displayed.",
-  detail: "Internal error. Flights continue; nothing was changed.",
-  hint: "Try again. Other pages still work. See the browser console for details.",
-  problems: [],
-};
+export const BROKEN_PAGE = localProblem(
+  "This page could not be displayed.",
+  "Internal error. Flights continue; nothing was changed.",
+  "Try again. Other pages still work. See the browser console for details.",
+);
 
 function text(value: unknown): string {
   return typeof value === "string" ? value : "";

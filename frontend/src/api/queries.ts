@@ -1,6 +1,7 @@
 /** All queries. `live/staleQueries.ts` invalidates them by their keys. */
 
-import { keepPreviousData, skipToken, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useComputedColorScheme } from "@mantine/core";
+import { keepPreviousData, type QueryKey, skipToken, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
 import { answer } from "./client";
 import {
@@ -16,10 +17,10 @@ import {
   getTrial,
   listCampaigns,
   listTrials,
-  type PageTrial,
   type Sort,
   type Trial,
 } from "./generated";
+import { everyPage, usePages } from "./pages";
 
 export type Theme = "light" | "dark";
 export type FigureName = "takeoffs" | "errors" | "gains";
@@ -41,14 +42,7 @@ export function useCatalogue() {
 const PAGE_SIZE = 24;
 
 export function useCampaigns(filter: CampaignFilter) {
-  return useInfiniteQuery({
-    queryKey: ["campaigns", filter],
-    queryFn: ({ pageParam }) =>
-      answer(listCampaigns({ query: { ...filter, limit: PAGE_SIZE, ...(pageParam ? { cursor: pageParam } : {}) } })),
-    initialPageParam: "",
-    getNextPageParam: (page) => page.next_cursor,
-    placeholderData: keepPreviousData,
-  });
+  return usePages(["campaigns", filter], PAGE_SIZE, (page) => answer(listCampaigns({ query: { ...filter, ...page } })));
 }
 
 export function useCampaign(campaignId: number | null) {
@@ -77,25 +71,10 @@ export function useStatistics(campaignId: number) {
   });
 }
 
-const LARGEST_PAGE = 200;
-
-/** Every trial of a campaign, page after page. */
-async function allTrials(campaignId: number): Promise<Trial[]> {
-  const trials: Trial[] = [];
-  let cursor: string | null = null;
-  do {
-    const query: { limit: number; cursor?: string } = { limit: LARGEST_PAGE, ...(cursor === null ? {} : { cursor }) };
-    const page: PageTrial = await answer(listTrials({ path: { campaign_id: campaignId }, query }));
-    trials.push(...page.items);
-    cursor = page.next_cursor;
-  } while (cursor !== null);
-  return trials;
-}
-
 export function useTrials(campaignId: number) {
   return useQuery({
     queryKey: ["campaign", campaignId, "trials"],
-    queryFn: () => allTrials(campaignId),
+    queryFn: () => everyPage((query) => answer(listTrials({ path: { campaign_id: campaignId }, query }))),
   });
 }
 
@@ -103,6 +82,22 @@ export function useTrial(trialId: number | null) {
   return useQuery({
     queryKey: ["trial", trialId],
     queryFn: trialId === null ? skipToken : () => answer(getTrial({ path: { trial_id: trialId } })),
+  });
+}
+
+interface FigureOptions {
+  enabled?: boolean;
+  staleTime?: number;
+}
+
+/** A figure in the page's colours; the one before is shown until it is there. */
+export function useFigure<Figure>(key: QueryKey, read: (theme: Theme) => Promise<Figure>, options?: FigureOptions) {
+  const theme = useComputedColorScheme("light");
+  return useQuery({
+    queryKey: [...key, theme],
+    queryFn: () => read(theme),
+    placeholderData: keepPreviousData,
+    ...options,
   });
 }
 
@@ -114,19 +109,15 @@ export interface FigureView {
   predicted?: number;
 }
 
-export function useCampaignFigure(campaignId: number, name: FigureName, theme: Theme, view: FigureView | null = null) {
-  const { window = null, flight = null, predicted } = view ?? {};
-  const query = {
-    theme,
-    ...(window && { from_s: window[0], to_s: window[1] }),
-    ...(flight !== null && { flight }),
-    ...(predicted !== undefined && { predicted }),
-  };
-  return useQuery({
-    queryKey: ["campaign", campaignId, "figure", name, query],
-    queryFn: () => answer(getCampaignFigure({ path: { campaign_id: campaignId, name }, query })),
-    placeholderData: keepPreviousData,
-  });
+export function useCampaignFigure(
+  campaignId: number,
+  name: FigureName,
+  { window, flight, predicted }: FigureView = {},
+) {
+  const detail = { predicted, flight: flight ?? undefined, from_s: window?.[0], to_s: window?.[1] };
+  return useFigure(["campaign", campaignId, "figure", name, detail], (theme) =>
+    answer(getCampaignFigure({ path: { campaign_id: campaignId, name }, query: { ...detail, theme } })),
+  );
 }
 
 const POINTS = 300;
@@ -150,22 +141,19 @@ export function useCurveOf(trials: readonly Trial[], experiment: string) {
   );
 }
 
-export function useFlightFigure(trialId: number, theme: Theme) {
-  return useQuery({
-    queryKey: ["trial", trialId, "figure", theme],
-    queryFn: () => answer(getFlightFigure({ path: { trial_id: trialId }, query: { theme } })),
-    placeholderData: keepPreviousData,
-  });
+export function useFlightFigure(trialId: number) {
+  return useFigure(["trial", trialId, "figure"], (theme) =>
+    answer(getFlightFigure({ path: { trial_id: trialId }, query: { theme } })),
+  );
 }
 
 export const recordCsv = (trialId: number): string => `/api/trials/${trialId}/trajectory.csv`;
 
 /** The request starts the computation, so it is sent only when the panel is in view. */
-export function useLandscape(campaignId: number, theme: Theme, enabled: boolean) {
-  return useQuery({
-    queryKey: ["campaign", campaignId, "landscape", theme],
-    queryFn: () => answer(getLandscape({ path: { campaign_id: campaignId }, query: { theme } })),
-    placeholderData: keepPreviousData,
-    enabled,
-  });
+export function useLandscape(campaignId: number, enabled: boolean) {
+  return useFigure(
+    ["campaign", campaignId, "landscape"],
+    (theme) => answer(getLandscape({ path: { campaign_id: campaignId }, query: { theme } })),
+    { enabled },
+  );
 }

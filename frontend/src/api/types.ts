@@ -11,6 +11,7 @@ export type {
   Catalogue,
   Check,
   CheckItem,
+  Classification,
   DefinitionOutput as Definition,
   Explanation,
   FittedParameter,

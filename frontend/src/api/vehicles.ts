@@ -1,31 +1,19 @@
 /** Queries of vehicles. `live/staleQueries.ts` invalidates them by their keys. */
 
-import { keepPreviousData, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
-import { getCalibration, getVehicleFigure, listVehicles, type PageVehicle, type Vehicle } from "./generated";
-import type { Theme } from "./queries";
+import { getCalibration, getVehicleFigure, listVehicles, type Vehicle } from "./generated";
+import { everyPage } from "./pages";
+import { useFigure } from "./queries";
 
-const LARGEST_PAGE = 200;
 /** The expiry of a lease causes no event, so a shown lease is polled. */
 const CONTROL_MS = 10_000;
-
-async function allVehicles(): Promise<Vehicle[]> {
-  const vehicles: Vehicle[] = [];
-  let cursor: string | null = null;
-  do {
-    const query: { limit: number; cursor?: string } = { limit: LARGEST_PAGE, ...(cursor === null ? {} : { cursor }) };
-    const page: PageVehicle = await answer(listVehicles({ query }));
-    vehicles.push(...page.items);
-    cursor = page.next_cursor;
-  } while (cursor !== null);
-  return vehicles;
-}
 
 /** All vehicles: registered ones and shared simulations. */
 export function useVehicles() {
   return useQuery({
     queryKey: ["vehicles"],
-    queryFn: allVehicles,
+    queryFn: () => everyPage((query) => answer(listVehicles({ query }))),
     refetchInterval: ({ state }) => (state.data?.some(({ control }) => control !== null) ? CONTROL_MS : false),
   });
 }
@@ -52,10 +40,8 @@ export function useCalibration(vehicleId: number) {
   });
 }
 
-export function useVehicleFigure(vehicleId: number, name: "calibration" | "batteries", theme: Theme) {
-  return useQuery({
-    queryKey: ["history", vehicleId, name, theme],
-    queryFn: () => answer(getVehicleFigure({ path: { vehicle_id: vehicleId, name }, query: { theme } })),
-    placeholderData: keepPreviousData,
-  });
+export function useVehicleFigure(vehicleId: number, name: "calibration" | "batteries") {
+  return useFigure(["history", vehicleId, name], (theme) =>
+    answer(getVehicleFigure({ path: { vehicle_id: vehicleId, name }, query: { theme } })),
+  );
 }

@@ -70,8 +70,7 @@ export const theme = createTheme({
     ActionIcon: { defaultProps: { size: TOUCH_TARGET_PX, variant: "subtle" } },
     TextInput: tall,
     InputBase: tall,
+    NativeSelect: tall,
     Title: { styles: { root: { letterSpacing: "-0.015em" } } },
-    Textarea: { defaultProps: { size: "md" } },
-    FileInput: tall,
   },
 });

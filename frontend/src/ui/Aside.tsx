@@ -3,7 +3,7 @@ import type { ComponentProps } from "react";
 import classes from "./Aside.module.css";
 
 interface Props extends BoxProps, Omit<ComponentProps<"div">, keyof BoxProps> {
-  tone?: "good" | "warn" | "bad" | undefined;
+  tone?: "good" | "warn" | "bad";
 }
 
 /** A remark with a coloured edge. */

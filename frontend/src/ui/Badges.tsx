@@ -27,7 +27,7 @@ export function StateBadge({ words: { word, tone } }: { words: StateLabel }) {
 
 interface Props {
   isReal: boolean;
-  title?: string | undefined;
+  title?: string;
 }
 
 /** SIM is blue, REAL is hatched orange; both also differ in text and icon. */

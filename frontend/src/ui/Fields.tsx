@@ -1,4 +1,4 @@
-import { Checkbox, InputBase, type InputBaseProps, TextInput, type TextInputProps } from "@mantine/core";
+import { Checkbox, NativeSelect, type NativeSelectProps, TextInput, type TextInputProps } from "@mantine/core";
 import { IconChevronDown } from "@tabler/icons-react";
 import { useState } from "react";
 import { inPercent } from "../api/problems";
@@ -14,7 +14,7 @@ export interface NumberFieldProps extends Omit<TextInputProps, "value" | "onChan
   /** Value of an empty field; without it the field must be filled. */
   empty?: number;
   /** Whether only whole numbers are valid. */
-  whole?: boolean | undefined;
+  whole?: boolean;
 }
 
 /** Number input. Passes on valid input as a number and anything else as text, with an error message. */
@@ -83,7 +83,7 @@ interface OptionFieldProps {
   onChange: (value: OptionValue) => void;
 }
 
-function rangeOf({ lower = null, upper = null, unit = "" }: OptionInfo): string | undefined {
+function rangeOf({ lower, upper, unit }: OptionInfo): string | undefined {
   const after = unitAfter(unit);
   if (lower === null && upper === null) return after.trim() || undefined;
   return `${lower ?? "…"} … ${upper ?? ""}${after}`.trim();
@@ -142,33 +142,20 @@ export function OptionField({ option, value, onChange, ...props }: OptionFieldPr
   );
 }
 
-interface SelectFieldProps<Value extends string> extends InputBaseProps {
-  "aria-label"?: string;
+interface SelectFieldProps<Value extends string> extends Omit<NativeSelectProps, "data" | "value" | "onChange"> {
   data: readonly { value: Value; label: string }[];
   value?: NoInfer<Value>;
   onChange: (value: Value) => void;
 }
 
 /** Native select: large on touch screens, and accessible to screen readers. */
-export function SelectField<Value extends string>({ data, onChange, ...props }: SelectFieldProps<Value>) {
+export function SelectField<Value extends string>({ onChange, ...props }: SelectFieldProps<Value>) {
   return (
-    <InputBase
-      component="select"
-      pointer
+    <NativeSelect
       rightSection={<IconChevronDown size={18} aria-hidden />}
-      rightSectionPointerEvents="none"
       inputWrapperOrder={["label", "input", "description", "error"]}
-      onChange={(event) => {
-        const chosen = data.find(({ value }) => value === event.currentTarget.value);
-        if (chosen !== undefined) onChange(chosen.value);
-      }}
+      onChange={({ currentTarget }) => onChange(currentTarget.value as Value)}
       {...props}
-    >
-      {data.map(({ value, label }) => (
-        <option key={value} value={value}>
-          {label}
-        </option>
-      ))}
-    </InputBase>
+    />
   );
 }

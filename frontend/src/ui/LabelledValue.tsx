@@ -1,4 +1,3 @@
-import { Text } from "@mantine/core";
 import type { ReactNode } from "react";
 import type { Topic } from "./explanations";
 import { HelpTip } from "./HelpTip";
@@ -11,17 +10,14 @@ interface Props {
   stale?: boolean;
 }
 
-/** One reading with its name; stale readings are grey. */
-export function LabelledValue({ title, value, topic, bad = false, stale = false }: Props) {
-  const color = bad ? "var(--bad)" : "var(--ink)";
+/** One reading with its name, as large as its list has them. */
+export function LabelledValue({ title, value, topic, bad, stale }: Props) {
   return (
-    <div>
-      <Text component="dt" c="dimmed" fz="small">
+    <div data-bad={bad || undefined} data-stale={stale || undefined}>
+      <dt>
         {title} {topic && <HelpTip topic={topic} />}
-      </Text>
-      <Text component="dd" c={stale ? "dimmed" : color} fw={stale ? 550 : 650} fz="strong">
-        {value}
-      </Text>
+      </dt>
+      <dd>{value}</dd>
     </div>
   );
 }

@@ -8,11 +8,10 @@ import {
   tableFeatures,
   useTable,
 } from "@tanstack/react-table";
-import { type ReactNode, useState } from "react";
+import { type ComponentProps, type ReactNode, useState } from "react";
 import type { Topic } from "./explanations";
 import { HelpTip } from "./HelpTip";
-import { ScrollTable, type TableFrame } from "./ScrollTable";
-import classes from "./ScrollTable.module.css";
+import classes from "./ListTable.module.css";
 
 export interface Column<Row> {
   title: string;
@@ -41,7 +40,12 @@ interface RowProps<Row> {
   below?: (row: Row) => ReactNode;
 }
 
-interface Props<Row> extends RowProps<Row>, TableFrame {
+interface Props<Row> extends RowProps<Row>, ComponentProps<"section"> {
+  label: string;
+  /** Whether a long table scrolls under its head instead of making the page longer. */
+  framed?: boolean;
+  /** In px, in place of what its rows need. */
+  height?: number;
   rows: readonly Row[];
   keyOf: (row: Row) => string;
   /** What the rows of a table are that may be long: it shows the last ones, when sorted the first, more on request. */
@@ -56,7 +60,7 @@ const FEATURES = tableFeatures({ rowSortingFeature, sortedRowModel: createSorted
 const ROWS = 50;
 const MORE_ROWS = 200;
 
-/** A list as a table; columns with values sort it. */
+/** A list as a table, in a region that scrolls sideways where the screen is too narrow; columns with values sort it. */
 export function ListTable<Row extends RowData>({
   columns,
   marks,
@@ -66,8 +70,11 @@ export function ListTable<Row extends RowData>({
   what,
   isKept,
   groupOf,
+  label,
+  framed = false,
+  height,
   className = "",
-  ...frame
+  ...region
 }: Props<Row>) {
   const [count, setCount] = useState(ROWS);
   const table = useTable({
@@ -99,37 +106,46 @@ export function ListTable<Row extends RowData>({
     </tbody>
   );
   return (
-    <ScrollTable className={`${classes["list"]} ${className}`} {...frame}>
-      <thead>
-        <tr>
-          {columns.map((column) => {
-            const { title, id = title, value } = column;
-            const by = value && table.getColumn(id);
-            return (
-              <Title key={id} column={column} sorted={by?.getIsSorted()} onSort={by && (() => by.toggleSorting())} />
-            );
-          })}
-        </tr>
-      </thead>
-      {!isSorted && more}
-      {[...new Set(shown.map(bodyOf))].map((name) => (
-        <tbody key={name}>
-          {groupOf && (
-            <tr>
-              <th scope="rowgroup" colSpan={columns.length} className={classes["group"]}>
-                {name}
-              </th>
-            </tr>
-          )}
-          {shown
-            .filter((row) => bodyOf(row) === name)
-            .map((row) => (
-              <Lines key={keyOf(row)} {...{ row, columns, marks, below }} />
-            ))}
-        </tbody>
-      ))}
-      {isSorted && more}
-    </ScrollTable>
+    <section
+      {...region}
+      className={`${classes["scroll"]} ${framed || height !== undefined ? classes["framed"] : ""} sideways`}
+      style={{ height, maxHeight: height }}
+      aria-label={label}
+      // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+      tabIndex={0}
+    >
+      <table className={`${classes["list"]} ${className}`}>
+        <thead>
+          <tr>
+            {columns.map((column) => {
+              const { title, id = title, value } = column;
+              const by = value && table.getColumn(id);
+              return (
+                <Title key={id} column={column} sorted={by?.getIsSorted()} onSort={by && (() => by.toggleSorting())} />
+              );
+            })}
+          </tr>
+        </thead>
+        {!isSorted && more}
+        {[...new Set(shown.map(bodyOf))].map((name) => (
+          <tbody key={name}>
+            {groupOf && (
+              <tr>
+                <th scope="rowgroup" colSpan={columns.length} className={classes["group"]}>
+                  {name}
+                </th>
+              </tr>
+            )}
+            {shown
+              .filter((row) => bodyOf(row) === name)
+              .map((row) => (
+                <Lines key={keyOf(row)} {...{ row, columns, marks, below }} />
+              ))}
+          </tbody>
+        ))}
+        {isSorted && more}
+      </table>
+    </section>
   );
 }
 

@@ -1,7 +1,7 @@
 import { Text } from "@mantine/core";
 import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
+import { localProblem, otherProblems, problemOf } from "../api/problems";
 import { asSentence, stopped } from "./format";
 import classes from "./Notices.module.css";
 
@@ -61,19 +61,7 @@ export function ErrorNotice({ error, shown = [] }: Props) {
 
 /** Why something failed earlier, as the server has stored it. Renders nothing without a reason. */
 export function FailureNotice({ reason }: { reason: string }) {
-  const problem = { status: 0, title: asSentence(reason), detail: "", hint: "", problems: [] } satisfies Problem;
-  return <ErrorNotice error={reason === "" ? null : problem} />;
-}
-
-interface FormErrorProps {
-  error: unknown;
-  /** Labels of the form's fields, by the names that the server has for them; each shows its own reason. */
-  labels: Readonly<Record<string, string>>;
-}
-
-/** A form's refusal: which fields to correct, where all reasons are written at their fields. */
-export function FormErrorNotice({ error, labels }: FormErrorProps) {
-  return <ErrorNotice error={formProblem(error, labels)} shown={Object.keys(labels)} />;
+  return <ErrorNotice error={reason === "" ? null : localProblem(asSentence(reason))} />;
 }
 
 interface AccessProps {

@@ -6,7 +6,7 @@ interface Props {
   title: ReactNode;
   tools?: ReactNode;
   children: ReactNode;
-  className?: string | undefined;
+  className?: string;
 }
 
 export function Panel({ title, tools, children, className = "" }: Props) {

@@ -14,7 +14,7 @@ export interface Units {
 
 const TAKEOFF: Units = { error: "m", output: "m", gains: "counts", setPoint: 3 };
 
-function experimentOf(catalogue: Catalogue | undefined, experiment: string) {
+export function experimentOf(catalogue: Catalogue | undefined, experiment: string) {
   return catalogue?.experiments.find(({ name }) => name === experiment);
 }
 

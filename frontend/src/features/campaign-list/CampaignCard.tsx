@@ -48,7 +48,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
           }
         />
       </Stack>
-      <Note fz="small" mt="auto" pt={10} className={classes["next"] ?? ""}>
+      <Note fz="small" mt="auto" pt={10} className={classes["next"]}>
         {next_action}
       </Note>
       <More campaign={campaign} />

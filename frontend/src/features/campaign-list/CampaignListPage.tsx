@@ -1,4 +1,4 @@
-import { Box, Button, Group, SegmentedControl, SimpleGrid, Skeleton, TextInput, Title } from "@mantine/core";
+import { Button, Group, SegmentedControl, SimpleGrid, Skeleton, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -8,11 +8,11 @@ import type { Sort } from "../../api/types";
 import { SelectField } from "../../ui/Fields";
 import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
-import { addPage } from "../../ui/paging";
+import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
-import { STATE_FILTERS, STATES, type StateFilter } from "./campaignList";
+import { STATES, type StateFilter } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
 import { ImportBundle } from "./ImportBundle";
 
@@ -29,16 +29,15 @@ const CARDS = { minColWidth: "min(300px, 100%)", spacing: "var(--gap)" };
 export function CampaignListPage() {
   useTitle("Campaigns");
   const [search, setSearch] = useState("");
-  const [state, setState] = useState<StateFilter>("all");
+  const [state, setState] = useState<StateFilter>("All");
   const [vehicle, setVehicle] = useState("");
   const [sort, setSort] = useState<Sort>("-updated");
   const [sought] = useDebouncedValue(search.trim(), 200);
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
-  const filtered = sought !== "" || state !== "all" || vehicle !== "";
+  const filtered = sought !== "" || state !== "All" || vehicle !== "";
   const campaigns = useCampaigns({ search: sought, state: STATES[state], vehicle: vehicle ? [vehicle] : [], sort });
-  const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
-  const total = campaigns.data?.pages[0]?.total ?? 0;
-  if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
+  const found = campaigns.data?.items ?? [];
+  if (campaigns.data?.total === 0 && !filtered) return <FirstCampaign />;
   return (
     <>
       <Group gap={12} mb={14}>
@@ -50,7 +49,7 @@ export function CampaignListPage() {
         </Button>
         <ImportBundle />
       </Group>
-      <Group component="search" gap={10} mb={18} className={classes["filters"] ?? ""}>
+      <Group component="search" gap={10} mb={18} className={classes["filters"]}>
         <TextInput
           flex="1 1 160px"
           aria-label="Search campaigns by name"
@@ -63,8 +62,8 @@ export function CampaignListPage() {
           aria-label="State"
           size="md"
           value={state}
-          onChange={(value) => setState(value as StateFilter)}
-          data={STATE_FILTERS}
+          onChange={setState}
+          data={Object.keys(STATES) as StateFilter[]}
         />
         <SelectField
           flex="9 1 150px"
@@ -95,7 +94,7 @@ export function CampaignListPage() {
               variant="default"
               onClick={() => {
                 setSearch("");
-                setState("all");
+                setState("All");
                 setVehicle("");
               }}
             >
@@ -109,13 +108,7 @@ export function CampaignListPage() {
           <CampaignCard key={campaign.id} campaign={campaign} />
         ))}
       </SimpleGrid>
-      {campaigns.hasNextPage && (
-        <Box mt={20} ta="center">
-          <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
-            Show more ({found.length} of {total})
-          </Button>
-        </Box>
-      )}
+      <ShowMore list={campaigns} mt={20} mx="auto" display="block" />
     </>
   );
 }

@@ -51,7 +51,7 @@ export function FirstCampaign() {
       <Button
         size="lg"
         maw="100%"
-        className={page["wrapping"] ?? ""}
+        className={page["wrapping"]}
         loading={create.isPending}
         disabled={preset === undefined}
         leftSection={<IconPlus size={22} aria-hidden />}

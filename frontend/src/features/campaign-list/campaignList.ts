@@ -3,21 +3,17 @@
 import type { CampaignState, CampaignSummary } from "../../api/types";
 import { against, percentChange } from "../../ui/format";
 
-export type StateFilter = "all" | "open" | "finished" | "archived";
+const ACTIVE: CampaignState[] = ["draft", "ready", "flying", "deciding"];
 
-export const STATE_FILTERS: { value: StateFilter; label: string }[] = [
-  { value: "all", label: "All" },
-  { value: "open", label: "Active" },
-  { value: "finished", label: "Finished" },
-  { value: "archived", label: "Archived" },
-];
+/** The states of campaigns that a filter shows. */
+export const STATES = {
+  All: [...ACTIVE, "finished"],
+  Active: ACTIVE,
+  Finished: ["finished"],
+  Archived: ["archived"],
+} satisfies Record<string, CampaignState[]>;
 
-export const STATES: Record<StateFilter, CampaignState[]> = {
-  all: ["draft", "ready", "flying", "deciding", "finished"],
-  open: ["draft", "ready", "flying", "deciding"],
-  finished: ["finished"],
-  archived: ["archived"],
-};
+export type StateFilter = keyof typeof STATES;
 
 /** Comparison of the best gains with the first; null before the second flight. */
 export function progress({ best, first_error, flights, verdict }: CampaignSummary): string | null {

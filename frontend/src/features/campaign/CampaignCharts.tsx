@@ -1,6 +1,6 @@
 /** The charts of a campaign. Each keeps its own state, so that the page is not rendered again for it. */
 
-import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
+import { SegmentedControl } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { memo, useCallback, useDeferredValue, useMemo, useState } from "react";
 import { type TimeRange, useCampaignFigure, useCurveOf } from "../../api/queries";
@@ -31,17 +31,16 @@ interface CurvesProps {
 
 /** The curves of all flights with the set point and the next prediction. */
 export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, preview, onChoose }: CurvesProps) {
-  const theme = useComputedColorScheme("light");
   const [picked, setPicked] = useState<Span>("first");
   const chosenSpan = campaign.flying === null ? picked : "whole";
   const span = useDeferredValue(chosenSpan);
   const [zoom, setZoom] = useState<TimeRange | null>(null);
   const [whole, setWhole] = useState<TimeRange | null>(null);
-  const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme, {
+  const takeoffs = useCampaignFigure(campaign.id, "takeoffs", {
     window: zoom ?? (span === "whole" ? whole : null),
     flight: campaign.trials.flown > EACH_DRAWN ? chosen : null,
   });
-  const curveOf = useCurveOf(trials, campaign.definition.experiment ?? "takeoff");
+  const curveOf = useCurveOf(trials, campaign.definition.experiment);
   const figure = takeoffs.data?.figure as unknown as PlotlyFigure | null | undefined;
   const known = figure ? wholeFlight(figure) : null;
   if (known !== null && known.join() !== whole?.join()) setWhole(known);
@@ -115,9 +114,8 @@ function useNext(
 
 /** Error and gains per flight. */
 export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, preview, onChoose }: ByFlightProps) {
-  const theme = useComputedColorScheme("light");
-  const errors = useCampaignFigure(campaignId, "errors", theme);
-  const gains = useCampaignFigure(campaignId, "gains", theme);
+  const errors = useCampaignFigure(campaignId, "errors");
+  const gains = useCampaignFigure(campaignId, "gains");
   const [rested] = useDebouncedValue(preview, preview?.isCurrent === false ? WAITS_MS : AT_REST_MS);
   const height = Math.max(LOWER_PX, PANEL_PX * ((gains.data?.table?.columns.length ?? 1) - 1));
   return (

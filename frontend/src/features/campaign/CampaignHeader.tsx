@@ -23,15 +23,15 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const [renaming, setRenaming] = useState(false);
   const catalogue = useCatalogue().data;
   const vehicle = useVehicle(campaign.vehicle.id) ?? campaign.vehicle;
-  const replacement = catalogue && replacementOf(catalogue, campaign.definition.experiment ?? "takeoff");
+  const replacement = catalogue && replacementOf(catalogue, campaign.definition.experiment);
   return (
     <Box component="header" mb={14}>
-      <Group gap="0 16px" className={renaming ? "" : (classes["heading"] ?? "")}>
+      <Group gap="0 16px" className={renaming ? "" : classes["heading"]}>
         {renaming ? (
           <Rename campaign={campaign} onClose={() => setRenaming(false)} />
         ) : (
           <Group gap={4} wrap="nowrap" miw={0}>
-            <Title order={1} lh={1.2} className={classes["name"] ?? ""} title={campaign.name}>
+            <Title order={1} lh={1.2} className={classes["name"]} title={campaign.name}>
               {campaign.name}
             </Title>
             <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>
@@ -52,13 +52,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         <span>{count(campaign.trials.flown, "flight")}</span>
         <details className={classes["settings"]}>
           <summary>Settings</summary>
-          <SimpleGrid
-            component="dl"
-            minColWidth={200}
-            spacing={20}
-            verticalSpacing={10}
-            className={panel["panel"] ?? ""}
-          >
+          <SimpleGrid component="dl" minColWidth={200} spacing={20} verticalSpacing={10} className={panel["panel"]}>
             {settingsOf(campaign, catalogue).map(([title, value]) => (
               <LabelledValue key={title} title={title} value={value} />
             ))}

@@ -1,7 +1,7 @@
-import { Group, SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
+import { Group, SimpleGrid, Skeleton, Tabs } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
 import { flushSync } from "react-dom";
-import { useParams } from "react-router";
+import { useParams, useSearchParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";
@@ -21,7 +21,6 @@ import { NextFlightCard } from "./next-flight/NextFlightCard";
 import type { Preview } from "./proposal/useChosenFlight";
 import { StatisticsPanel } from "./statistics/StatisticsPanel";
 import { useCampaignStatus } from "./useCampaignStatus";
-import { useTab } from "./useTab";
 import { VerdictPanel } from "./verdict/VerdictPanel";
 import { shownTrial } from "./verdict/verdict";
 
@@ -38,28 +37,39 @@ function CampaignById({ campaignId }: { campaignId: number }) {
 }
 
 /** The two columns of the page. */
-const SIDE_BY_SIDE = { className: classes["columns"] ?? "", align: "stretch", gap: "var(--gap)" };
+const SIDE_BY_SIDE = { className: classes["columns"], align: "stretch", gap: "var(--gap)" };
 
 /** Loading state. Requests all data of the page in parallel. */
 function Coming({ campaignId }: { campaignId: number }) {
-  const theme = useComputedColorScheme("light");
   useCatalogue();
   useTrials(campaignId);
   useProposal(campaignId);
-  useCampaignFigure(campaignId, "takeoffs", theme);
-  useCampaignFigure(campaignId, "errors", theme);
-  useCampaignFigure(campaignId, "gains", theme);
+  useCampaignFigure(campaignId, "takeoffs");
+  useCampaignFigure(campaignId, "errors");
+  useCampaignFigure(campaignId, "gains");
   useEffect(() => {
     loadPlotly().catch(() => undefined); // the chart loads it again and reports the error
   }, []);
   return (
     <div className={classes["page"]}>
       <Group aria-busy="true" {...SIDE_BY_SIDE}>
-        <Skeleton height={480} radius="md" className={classes["results"] ?? ""} />
-        <Skeleton height={480} radius="md" className={classes["action"] ?? ""} />
+        <Skeleton height={480} radius="md" className={classes["results"]} />
+        <Skeleton height={480} radius="md" className={classes["action"]} />
       </Group>
     </div>
   );
+}
+
+const TABS = ["trends", "flights", "statistics"] as const;
+
+/** The open tab of a campaign's page, kept in the address so that going back and reloading show it again; the first for
+ * an address that names none of them. */
+function useTab(): [string, (tab: string | null) => void] {
+  const [params, setParams] = useSearchParams();
+  const tab = TABS.find((one) => one === params.get("tab")) ?? TABS[0];
+  const open = (value: string | null): void =>
+    setParams(value === null || value === TABS[0] ? {} : { tab: value }, { replace: true, preventScrollReset: true });
+  return [tab, open];
 }
 
 const NONE: readonly Trial[] = [];
@@ -76,7 +86,7 @@ function CampaignView({ campaign }: { campaign: Campaign }) {
   const [tab, openTab] = useTab();
   const standing = useCampaignStatus(campaign.id);
   const problem = useProposal(campaign.id).error ?? trouble;
-  const unit = useUnits(campaign.definition.experiment ?? "takeoff").error;
+  const unit = useUnits(campaign.definition.experiment).error;
   const shown = shownTrial(trials, chosen, standing?.campaign ?? campaign);
   const watching = useReadOnlyReason(campaign.vehicle);
   const choose = useCallback(
@@ -122,13 +132,7 @@ function CampaignView({ campaign }: { campaign: Campaign }) {
           {standing === null && <ErrorNotice error={problem} />}
         </div>
       </Group>
-      <Tabs
-        value={tab}
-        onChange={openTab}
-        mt="var(--gap)"
-        keepMounted={false}
-        classNames={{ tab: classes["tab"] ?? "" }}
-      >
+      <Tabs value={tab} onChange={openTab} mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] }}>
         <Tabs.List>
           <Tabs.Tab value="trends">Error and gains</Tabs.Tab>
           <Tabs.Tab value="flights">

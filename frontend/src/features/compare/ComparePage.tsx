@@ -1,5 +1,4 @@
-import { Box, Button, Group, Stack, Text, Title, useComputedColorScheme } from "@mantine/core";
-import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
+import { Box, Button, Group, Stack, Text, Title } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
 import { useSearchParams } from "react-router";
@@ -24,6 +23,7 @@ import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { toggled } from "../../ui/toggled";
 import { useTitle } from "../../ui/useTitle";
+import { VERDICTS } from "../campaign/verdict/verdict";
 import { ComparisonTable, lineStylesOf, SettingsTable } from "./ComparisonTable";
 import { againstFirst, chosenIn, remember, remembered, withoutRefused } from "./chosenFlights";
 import { FlightPicker } from "./FlightPicker";
@@ -118,13 +118,6 @@ function OnlyOne({ trialId }: { trialId: number }) {
   );
 }
 
-const ICONS = {
-  better: IconCircleArrowDown,
-  worse: IconCircleArrowUp,
-  unresolved: IconHelpHexagon,
-  "not known yet": IconHelpHexagon,
-} as const;
-
 interface ComparedProps {
   comparison: FlightComparison;
   trials: readonly number[];
@@ -132,10 +125,10 @@ interface ComparedProps {
 }
 
 function Compared({ comparison, trials, choose }: ComparedProps) {
-  const figure = useComparisonFigure(trials, useComputedColorScheme("light"));
+  const figure = useComparisonFigure(trials);
   const pens = useMemo(() => lineStylesOf(figure.data), [figure.data]);
   const { verdict, sentence, notes, flights, pairs } = comparison;
-  const Icon = ICONS[verdict ?? "unresolved"];
+  const { Icon } = VERDICTS[verdict ?? "unresolved"];
   const first = flights[0];
   const sentences = flights.flatMap(
     ({ trial_id }) => againstFirst(pairs, first?.trial_id ?? 0, trial_id)?.sentence ?? [],

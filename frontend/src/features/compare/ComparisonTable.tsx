@@ -135,7 +135,7 @@ function Against({ pair, first, unit }: { pair: FlightPair | null; first: string
   if (pair === null) return <small>reference</small>;
   const { verdict, basis, difference, standard_error, confidence, further } = pair;
   const same = basis === "repeats" && verdict !== null ? "Same gains, " : "";
-  const word = verdict === null ? UNJUDGED[basis] : VERDICTS[verdict];
+  const word = verdict === null ? UNJUDGED[basis] : VERDICTS[verdict].word;
   return (
     <>
       <strong style={{ color: verdict === null ? undefined : COLOURS[verdict] }}>

@@ -1,4 +1,4 @@
-import { Button, Text, TextInput } from "@mantine/core";
+import { Text, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -8,7 +8,7 @@ import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { addPage } from "../../ui/paging";
+import { ShowMore } from "../../ui/ShowMore";
 import { trialStateLabel, wasFlown } from "../../ui/states";
 import { useUnits } from "../../ui/units";
 import classes from "./Compare.module.css";
@@ -25,7 +25,7 @@ export function FlightPicker({ from, ...ticks }: Ticks & { from: number | null }
   const [sought] = useDebouncedValue(search.trim(), 200);
   const campaigns = useCampaigns({ search: sought, state: [], vehicle: [], sort: "-updated" });
   const origin = useCampaign(from);
-  const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
+  const found = campaigns.data?.items ?? [];
   const flown = found.filter(({ flights, id }) => flights > 0 && id !== from);
   return (
     <Panel title="Select flights">
@@ -45,7 +45,7 @@ export function FlightPicker({ from, ...ticks }: Ticks & { from: number | null }
           id={origin.data.id}
           name={origin.data.name}
           flights={origin.data.trials.flown}
-          experiment={origin.data.definition.experiment ?? "takeoff"}
+          experiment={origin.data.definition.experiment}
           open
           {...ticks}
         />
@@ -58,11 +58,9 @@ export function FlightPicker({ from, ...ticks }: Ticks & { from: number | null }
           {sought === "" ? "No flights yet. Fly a campaign first." : "No campaigns with flights match."}
         </Note>
       )}
-      {campaigns.hasNextPage && (
-        <Button variant="default" mt={8} loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
-          Show more campaigns
-        </Button>
-      )}
+      <ShowMore list={campaigns} mt={8}>
+        Show more campaigns
+      </ShowMore>
     </Panel>
   );
 }

@@ -83,7 +83,7 @@ function Trouble({ children }: { children: ReactNode }) {
 
 /** What connecting does, and why it has not succeeded yet. */
 function NotConnected({ vehicle }: { vehicle: Vehicle }) {
-  const acts = useActs(vehicle.id).data?.pages[0]?.items ?? [];
+  const acts = useActs(vehicle.id).data?.items ?? [];
   const isWanted = vehicle.actions.includes("disconnect");
   const other = vehicleAtSameAddress(vehicle, useVehicles().data ?? []);
   const failure = connectFailure(acts);
@@ -128,10 +128,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
           <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
         </dl>
         <form
-          onSubmit={(event) => {
-            event.preventDefault();
-            edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) });
-          }}
+          action={() => edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) })}
         >
           <Group gap={10} align="flex-end">
             <TextInput

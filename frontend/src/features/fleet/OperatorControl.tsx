@@ -45,12 +45,7 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
   const other = vehicle.control?.operator ?? null;
   const isSameName = other === name.trim();
   return (
-    <form
-      onSubmit={(event) => {
-        event.preventDefault();
-        take.mutate({ operator: name.trim(), takeOver: other !== null });
-      }}
-    >
+    <form action={() => take.mutate({ operator: name.trim(), takeOver: other !== null })}>
       <Stack gap={12}>
         {other !== null && (
           <Text lh={1.4}>

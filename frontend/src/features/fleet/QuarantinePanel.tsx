@@ -40,12 +40,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         <LandNow isDown={isDown} orders={orders} flex="1 1 260px" />
         <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching} />
       </Group>
-      <form
-        onSubmit={(event) => {
-          event.preventDefault();
-          release.mutate(statement.trim());
-        }}
-      >
+      <form action={() => release.mutate(statement.trim())}>
         <Group gap={10} align="flex-end">
           <TextInput
             label="Inspected by, and findings"
@@ -90,11 +85,11 @@ interface Props {
   status: Aged | null;
   orders: ReturnType<typeof useVehicleCommands>;
   /** Whether this browser has read-only access, which disables the control. */
-  watching?: boolean;
+  watching: boolean;
 }
 
 /** Emergency stop of the motors, separate from other controls. */
-export function MotorsOff({ vehicle, status, orders, watching = false }: Props) {
+export function MotorsOff({ vehicle, status, orders, watching }: Props) {
   const asked = vehicle.actions.includes("motors off") || status?.status.armed === true;
   const enabled = asked && !watching;
   return (

@@ -9,19 +9,18 @@ import { NumberField, numbersOf } from "../../ui/Fields";
 import { RequestForm } from "../../ui/FormPage";
 import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, RESTORED, safeGainsWritten, sameHeld } from "../../ui/gains";
-import { HelpTip } from "../../ui/HelpTip";
+import { ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
-import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { unknownGainsText, unreadGains, type VehicleForm } from "./fleet";
-import { CheckResult } from "./VehicleReadings";
+import { type ButtonRequest, CheckResult } from "./VehicleReadings";
 
 interface Props {
   vehicle: Vehicle;
-  restoring: boolean;
-  onRestore: () => void;
+  /** Props of the button that restores them. */
+  restore: ButtonRequest;
 }
 
 /** The current gains against the safe gains, while data comes from the vehicle and after. */
@@ -32,7 +31,7 @@ const DIFFERENT = [
 ];
 
 /** The vehicle's current gains next to its safe gains. */
-export function SafeGains({ vehicle, restoring, onRestore }: Props) {
+export function SafeGains({ vehicle, restore }: Props) {
   const [entered, setEntered] = useState<Record<string, number>>();
   const status = useVehicleStatus(vehicle.id);
   const { safe_gains: safe } = vehicle;
@@ -46,28 +45,17 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   return (
     <Panel title="Gains">
       <Stack gap={14}>
-        <table className={`${table["table"]} ${classes["table"]}`}>
-          <thead>
-            <tr>
-              <th scope="col">Gain</th>
-              <th scope="col" data-number>
-                Current
-              </th>
-              <th scope="col" data-number>
-                Safe <HelpTip topic="safeGains" />
-              </th>
-            </tr>
-          </thead>
-          <tbody className="numbers">
-            {Object.entries(safe).map(([name, value]) => (
-              <tr key={name}>
-                <th scope="row">{name}</th>
-                <td data-number>{held[name] === undefined ? NOTHING : gainText(held[name])}</td>
-                <td data-number>{gainText(value)}</td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
+        <ListTable
+          label="Current and safe gains"
+          className={classes["table"]}
+          rows={Object.entries(safe)}
+          keyOf={([name]) => name}
+          columns={[
+            { title: "Gain", isHeading: true, cell: ([name]) => name },
+            { title: "Current", cell: ([name]) => (held[name] === undefined ? NOTHING : gainText(held[name])) },
+            { title: "Safe", topic: "safeGains", cell: ([, value]) => gainText(value) },
+          ]}
+        />
         {isKnown && <CheckResult passed={isSafe}>{isCurrent ? now : before}</CheckResult>}
         <Note>
           {isKnown ? (
@@ -81,7 +69,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           {mayRestore && isArmed(status) && " They can be restored on request once its motors have stopped."}
         </Note>
         <Group gap={10}>
-          <Button variant="default" disabled={!mayRestore || isArmed(status)} loading={restoring} onClick={onRestore}>
+          <Button variant="default" disabled={!mayRestore || isArmed(status)} {...restore}>
             Restore safe gains
           </Button>
           {isKnown && !isSafe && (

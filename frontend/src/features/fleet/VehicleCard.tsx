@@ -10,7 +10,6 @@ import { VehicleBadge } from "../../ui/Badges";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { ErrorNotice } from "../../ui/Notices";
-import row from "../../ui/RowCard.module.css";
 import classes from "./Fleet.module.css";
 import { VehicleStateBadge } from "./VehicleStateBadge";
 
@@ -24,7 +23,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
     <li
-      className={row["card"]}
+      className={classes["card"]}
       style={{ alignItems: "center", borderColor: vehicle.state === "quarantined" ? "var(--bad)" : undefined }}
     >
       <Stack gap={8} miw={0}>

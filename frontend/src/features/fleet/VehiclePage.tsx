@@ -27,7 +27,7 @@ export function VehiclePage() {
   const vehicles = useVehicles();
   const vehicle = vehicles.data?.find(({ id }) => id === vehicleId);
   useTitle(vehicle?.name ?? "Vehicle");
-  if (vehicle?.registered === false) return <SharedView vehicle={vehicle} />;
+  if (vehicle?.registered === false) return <SharedView key={vehicle.id} vehicle={vehicle} />;
   if (vehicle !== undefined) return <VehicleView key={vehicle.id} vehicle={vehicle} />;
   if (vehicles.error) return <ErrorNotice error={vehicles.error} />;
   return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;
@@ -71,8 +71,12 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const ask = useVehicleRequest(vehicle.id);
   const watching = useReadOnlyReason(vehicle);
   const status = useVehicleStatus(vehicle.id);
-  const may = (act: VehicleRequest): boolean => watching === null && vehicle.actions.includes(act);
-  const asking = ask.isPending ? ask.variables : null;
+  const may = (act: Vehicle["actions"][number]): boolean => watching === null && vehicle.actions.includes(act);
+  /** Props of the button for this request. */
+  const asks = (act: VehicleRequest) => ({
+    loading: ask.isPending && ask.variables === act,
+    onClick: () => ask.mutate(act),
+  });
   return (
     <Stack gap={14}>
       <VehicleHead vehicle={vehicle}>
@@ -85,21 +89,12 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           New campaign
         </Button>
         {may("connect") && (
-          <Button
-            leftSection={<IconPlugConnected size={20} aria-hidden />}
-            loading={asking === "connect"}
-            onClick={() => ask.mutate("connect")}
-          >
+          <Button leftSection={<IconPlugConnected size={20} aria-hidden />} {...asks("connect")}>
             Connect
           </Button>
         )}
         {may("disconnect") && (
-          <Button
-            variant="default"
-            leftSection={<IconPlugConnectedX size={20} aria-hidden />}
-            loading={asking === "disconnect"}
-            onClick={() => ask.mutate("disconnect")}
-          >
+          <Button variant="default" leftSection={<IconPlugConnectedX size={20} aria-hidden />} {...asks("disconnect")}>
             {vehicle.state === "disconnected" ? "Stop connecting" : "Disconnect"}
           </Button>
         )}
@@ -108,8 +103,8 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
       <ErrorNotice error={ask.error} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
       <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
-        <LinkPanel vehicle={vehicle} mayEdit={watching === null && vehicle.actions.includes("configure")} />
-        <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
+        <LinkPanel vehicle={vehicle} mayEdit={may("configure")} />
+        <SafeGains vehicle={vehicle} restore={asks("restore")} />
         <Panel title="Operator">
           {watching === null ? (
             <OperatorControl vehicle={vehicle} />
@@ -122,12 +117,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           title="Preflight checks"
           className={classes["wide"]}
           tools={
-            <Button
-              variant="default"
-              disabled={!may("check") || isArmed(status)}
-              loading={asking === "check"}
-              onClick={() => ask.mutate("check")}
-            >
+            <Button variant="default" disabled={!may("check") || isArmed(status)} {...asks("check")}>
               Check now
             </Button>
           }
@@ -135,12 +125,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           <CheckList vehicle={vehicle} />
         </Panel>
         <VehicleHistory vehicle={vehicle} />
-        <ParameterPanel
-          vehicleId={vehicle.id}
-          mayRead={may("parameters")}
-          reading={asking === "parameters"}
-          onRead={() => ask.mutate("parameters")}
-        />
+        <ParameterPanel vehicleId={vehicle.id} mayRead={may("parameters")} read={asks("parameters")} />
       </SimpleGrid>
     </Stack>
   );

@@ -4,9 +4,9 @@ import { type ReactNode, useState } from "react";
 import { useActs } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { gainText } from "../../ui/format";
+import { ListTable } from "../../ui/ListTable";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
-import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { parametersOf } from "./fleet";
@@ -19,6 +19,12 @@ const OUTDATED: Partial<Record<Vehicle["state"], string>> = {
 
 const STEPS_REQUIRE = "Altitude steps require more, which is checked before each such flight.";
 
+/** Sends a request when pressed, and shows that it is under way. */
+export interface ButtonRequest {
+  loading: boolean;
+  onClick: () => void;
+}
+
 /** Result of a check in words, with its colour and icon. */
 export function CheckResult({ passed, children }: { passed: boolean; children: ReactNode }) {
   const Icon = passed ? IconCircleCheck : IconAlertTriangle;
@@ -29,6 +35,14 @@ export function CheckResult({ passed, children }: { passed: boolean; children: R
     </Group>
   );
 }
+
+/** A cell with a remark below it, if any. */
+export const remarked = (what: ReactNode, remark: string | false) => (
+  <>
+    {what}
+    {remark && <small>{remark}</small>}
+  </>
+);
 
 /** All items of the last preflight check; outdated ones are grey. */
 export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle: Vehicle }) {
@@ -42,36 +56,26 @@ export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle:
   }
   return (
     <>
-      <div
-        className={table["scroll"]}
-        style={state in OUTDATED ? { filter: "grayscale(1)", opacity: 0.75 } : undefined}
-      >
-        <table className={`${table["table"]} ${classes["table"]}`}>
-          <thead>
-            <tr>
-              <th scope="col">Item</th>
-              <th scope="col">Result</th>
-              <th scope="col">Found</th>
-            </tr>
-          </thead>
-          <tbody>
-            {checks.map(({ name, title, passed, found, needed, hint }) => (
-              <tr key={name}>
-                <th scope="row">
-                  {title}
-                  {!passed && hint && <small>{hint}</small>}
-                </th>
-                <td>
-                  <CheckResult passed={passed}>{passed ? "passed" : "failed"}</CheckResult>
-                </td>
-                <td>
-                  {found}
-                  <small>required: {needed}</small>
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
+      <div style={state in OUTDATED ? { filter: "grayscale(1)", opacity: 0.75 } : undefined}>
+        <ListTable
+          label="Preflight checks"
+          className={classes["table"]}
+          rows={checks}
+          keyOf={({ name }) => name}
+          columns={[
+            {
+              title: "Item",
+              isHeading: true,
+              cell: ({ title, passed, hint }) => remarked(title, !passed && hint),
+            },
+            {
+              title: "Result",
+              isText: true,
+              cell: ({ passed }) => <CheckResult passed={passed}>{passed ? "passed" : "failed"}</CheckResult>,
+            },
+            { title: "Found", isText: true, cell: ({ found, needed }) => remarked(found, `required: ${needed}`) },
+          ]}
+        />
       </div>
       <Note>
         Checked <Time at={checked_at} />
@@ -84,25 +88,25 @@ export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle:
 interface Props {
   vehicleId: number;
   mayRead: boolean;
-  reading: boolean;
-  onRead: () => void;
+  /** Props of the button that reads them. */
+  read: ButtonRequest;
 }
 
 /** All parameters of the vehicle, as last read. */
-export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
+export function ParameterPanel({ vehicleId, mayRead, read }: Props) {
   const [wanted, setWanted] = useState("");
-  const acts = useActs(vehicleId).data?.pages.flatMap((page) => page.items) ?? [];
+  const acts = useActs(vehicleId).data?.items ?? [];
   const latest = acts.find(({ kind }) => kind === "parameters");
-  const read = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
+  const done = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
   const underWay = latest?.state === "requested" || latest?.state === "running";
-  const parameters = parametersOf(read?.result ?? null);
+  const parameters = parametersOf(done?.result ?? null);
   const found = parameters.filter(([name]) => name.toLowerCase().includes(wanted.trim().toLowerCase()));
   return (
     <Panel
       title="Parameters"
       className={classes["wide"]}
       tools={
-        <Button variant="default" disabled={!mayRead || underWay} loading={reading || underWay} onClick={onRead}>
+        <Button variant="default" {...read} disabled={!mayRead || underWay} loading={read.loading || underWay}>
           Read parameters
         </Button>
       }
@@ -119,23 +123,23 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
               value={wanted}
               onChange={(event) => setWanted(event.currentTarget.value)}
             />
-            {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
-            <section style={{ maxHeight: 420, overflow: "auto" }} aria-label="Parameters" tabIndex={0}>
-              <table className={`${table["table"]} ${classes["table"]}`}>
-                <tbody>
-                  {found.map(([name, value]) => (
-                    <tr key={name}>
-                      <th scope="row">{name}</th>
-                      <td data-number title={String(value)}>
-                        {gainText(value)}
-                      </td>
-                    </tr>
-                  ))}
-                </tbody>
-              </table>
-            </section>
+            <ListTable
+              label="Parameters"
+              framed
+              className={classes["table"]}
+              rows={found}
+              keyOf={([name]) => name}
+              columns={[
+                { title: "Parameter", hidesTitle: true, isHeading: true, cell: ([name]) => name },
+                {
+                  title: "Value",
+                  hidesTitle: true,
+                  cell: ([, value]) => <span title={String(value)}>{gainText(value)}</span>,
+                },
+              ]}
+            />
             <Note>
-              Read <Time at={read?.finished_at} />.
+              Read <Time at={done?.finished_at} />.
             </Note>
           </>
         )}

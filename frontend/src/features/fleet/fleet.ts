@@ -12,32 +12,32 @@ import type {
 } from "../../api/types";
 import type { Aged } from "../../live/vehicleStatus";
 import { type NumberEntry, numbersOf, type OptionValue } from "../../ui/Fields";
-import type { StateLabel } from "../../ui/states";
+import { bad, busy, good, quiet, type StateLabel } from "../../ui/states";
 
 const STATES: Record<VehicleState, StateLabel> = {
-  disconnected: { word: "Not connected", tone: "quiet" },
-  ready: { word: "Ready", tone: "good" },
-  staged: { word: "Staged", tone: "busy" },
-  flying: { word: "In flight", tone: "busy" },
-  quarantined: { word: "Quarantined", tone: "bad" },
+  disconnected: quiet("Not connected"),
+  ready: good("Ready"),
+  staged: busy("Staged"),
+  flying: busy("In flight"),
+  quarantined: bad("Quarantined"),
 };
 
 /** States that are known only while data comes from the vehicle. */
 const REPORTED: ReadonlySet<VehicleState> = new Set<VehicleState>(["ready", "staged", "flying"]);
 
 const SILENCES = {
-  connecting: { word: "Connecting", tone: "busy" },
-  connected: { word: "No data", tone: "bad" },
-  gone: { word: "Link lost", tone: "bad" },
-  "not answering": { word: "Commands blocked", tone: "bad" },
+  connecting: busy("Connecting"),
+  connected: bad("No data"),
+  gone: bad("Link lost"),
+  "not answering": bad("Commands blocked"),
 } as const;
 
 /** A shared vehicle has no permanent connection. `status` is null if the vehicle has none, or it is not known yet. */
 export function vehicleStateLabel(vehicle: Vehicle, status: Aged | null): StateLabel {
   const { state, registered } = vehicle;
-  if (!registered && state === "disconnected") return { word: "No link", tone: "quiet" };
+  if (!registered && state === "disconnected") return quiet("No link");
   if (status !== null && !status.isCurrent && REPORTED.has(state)) return SILENCES[status.status.state];
-  if (state === "ready" && failedChecks(vehicle).length > 0) return { word: "Preflight check failed", tone: "bad" };
+  if (state === "ready" && failedChecks(vehicle).length > 0) return bad("Preflight check failed");
   return STATES[state];
 }
 
@@ -85,18 +85,13 @@ export const ACTS: Record<ActKind, string> = {
   abort: "Abort",
 };
 
-const PURPOSES: Record<GivenGains["purpose"], string> = {
+export const PURPOSES: Record<GivenGains["purpose"], string> = {
   flight: "Flight",
   "restore after flight": "Safe gains after flight",
   connect: "Safe gains at connection",
   restore: "Safe gains, on request",
   release: "Safe gains at release",
 };
-
-/** Purpose of a line of the gain history. */
-export function purposeOf({ purpose, asked }: Pick<GivenGains, "purpose" | "asked">): string {
-  return Object.keys(asked).length === 0 ? "Found at connection, nothing sent" : PURPOSES[purpose];
-}
 
 export function autopilotTitle(catalogue: Catalogue | undefined, { options }: Pick<Vehicle, "options">): string {
   return catalogue?.autopilots.find(({ name }) => name === options["autopilot"])?.label ?? "";
@@ -173,7 +168,7 @@ export function connectFailure(acts: readonly VehicleAct[]): string {
 /** Options of the collapsed section; those of this autopilot alone, if one is given. */
 export function furtherOptions(catalogue: Catalogue, autopilot?: string): OptionInfo[] {
   const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
-  const isOffered = ({ autopilots = [] }: OptionInfo): boolean =>
+  const isOffered = ({ autopilots }: OptionInfo): boolean =>
     autopilot === undefined || autopilots.length === 0 || autopilots.includes(autopilot);
   return options.filter((option) => !PLAIN.has(option.name) && isOffered(option));
 }

@@ -1,4 +1,4 @@
-import { Anchor, Group, Skeleton, Stack, Text, Title, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Group, Skeleton, Stack, Text, Title } from "@mantine/core";
 import { IconAlertOctagonFilled, IconChevronLeft } from "@tabler/icons-react";
 import { useMemo, useRef, useState } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
@@ -183,9 +183,8 @@ function groundOf(live: LiveFlight | null): number {
 
 /** Its curve beside the earlier ones, over all of its time. */
 function useTakeoffs({ campaign_id, number }: Trial, groundM: number) {
-  const theme = useComputedColorScheme("light");
   const [window, setWindow] = useState<TimeRange | null>(null);
-  const card = useCampaignFigure(campaign_id, "takeoffs", theme, { window, predicted: number }).data;
+  const card = useCampaignFigure(campaign_id, "takeoffs", { window, predicted: number }).data;
   const raw = card?.figure as PlotlyFigure | null | undefined;
   const whole = raw ? wholeFlight(raw) : null;
   if (whole !== null && whole.join() !== window?.join()) setWindow(whole);

@@ -1,10 +1,10 @@
-import { Box, Button, Group, SegmentedControl, Skeleton, Stack, Title } from "@mantine/core";
+import { Button, Group, SegmentedControl, Skeleton, Stack, Title } from "@mantine/core";
 import { useState } from "react";
 import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../../api/jobs";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { addPage } from "../../ui/paging";
+import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
 import { JobTable } from "./JobTable";
 
@@ -16,6 +16,9 @@ const STATES = {
 type GroupName = keyof typeof STATES;
 type Filter = GroupName | "All";
 
+/** Place of the button for more jobs. */
+const BELOW = { mt: 20, mx: "auto", display: "block" };
+
 /** Number of failed jobs shown above the active ones. */
 const FAILURES_FIRST = 3;
 
@@ -26,7 +29,7 @@ export function JobsPage() {
   const groups = [useGroup("Failed", filter), useGroup("Active", filter), useGroup("Finished", filter)];
   const titles = new Map((useReproductions().data?.items ?? []).map(({ name, title }) => [name, title]));
   const shown = groups.filter(({ group }) => filter === "All" || filter === group);
-  const isPending = shown.some((jobs) => jobs.isPending);
+  const isPending = shown.some(({ query }) => query.isPending);
   return (
     <>
       <Group justify="space-between" gap={12} mb={14}>
@@ -39,7 +42,7 @@ export function JobsPage() {
           data={["All", "Failed", "Active", "Finished"]}
         />
       </Group>
-      <ErrorNotice error={shown.find(({ error }) => error !== null)?.error} />
+      <ErrorNotice error={shown.find(({ query }) => query.error !== null)?.query.error} />
       {isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
       {!isPending && shown.every(({ total }) => total === 0) && (
         <Note py={48} ta="center">
@@ -51,19 +54,15 @@ export function JobsPage() {
       <Stack gap="var(--gap)">
         {shown
           .filter(({ total }) => total > 0)
-          .map(({ group, items, total, isBrief, ...query }) => (
+          .map(({ group, items, total, isBrief, query }) => (
             <Panel key={group} title={`${group} jobs`}>
               <JobTable label={`${group} jobs`} jobs={items} titles={titles} />
-              {query.hasNextPage && (
-                <Box mt={20} ta="center">
-                  <Button
-                    variant="default"
-                    loading={query.isFetchingNextPage}
-                    onClick={() => (isBrief ? setFilter(group) : void addPage(query))}
-                  >
-                    {isBrief ? `Show all ${total} failed jobs` : `Show more (${items.length} of ${total})`}
-                  </Button>
-                </Box>
+              {isBrief && items.length < total ? (
+                <Button variant="default" {...BELOW} onClick={() => setFilter(group)}>
+                  Show all {total} failed jobs
+                </Button>
+              ) : (
+                <ShowMore list={query} {...BELOW} />
               )}
             </Panel>
           ))}
@@ -75,6 +74,5 @@ export function JobsPage() {
 function useGroup(group: GroupName, filter: Filter) {
   const isBrief = group === "Failed" && filter === "All";
   const query = useJobs(STATES[group], isBrief ? FAILURES_FIRST : JOBS_PAGE);
-  const items = query.data?.pages.flatMap((page) => page.items) ?? [];
-  return { ...query, group, isBrief, items, total: query.data?.pages[0]?.total ?? 0 };
+  return { query, group, isBrief, ...(query.data ?? { items: [], total: 0 }) };
 }

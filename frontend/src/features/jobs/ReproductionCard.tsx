@@ -1,4 +1,4 @@
-import { Box, Button, SimpleGrid, Text, useComputedColorScheme } from "@mantine/core";
+import { Box, Button, SimpleGrid, Text } from "@mantine/core";
 import { IconPlayerPlay, IconX } from "@tabler/icons-react";
 import {
   type ReproductionRow,
@@ -141,8 +141,7 @@ interface FigureProps {
 }
 
 function Figure({ name, figure, title, jobId }: FigureProps) {
-  const theme = useComputedColorScheme("light");
-  const card = useReproductionFigure(name, figure, theme, jobId);
+  const card = useReproductionFigure(name, figure, jobId);
   return (
     <FigurePanel title={card.data?.title ?? title} card={card.data} error={card.error} height={FIGURE_HEIGHT_PX} />
   );

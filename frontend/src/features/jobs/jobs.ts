@@ -2,14 +2,14 @@
 
 import type { Job, JobState, ReproductionRow } from "../../api/jobs";
 import { NOTHING, percentText, trueMinus } from "../../ui/format";
-import type { StateLabel } from "../../ui/states";
+import { bad, busy, good, quiet, type StateLabel } from "../../ui/states";
 
 export const STATE_LABELS: Record<JobState, StateLabel> = {
-  queued: { word: "Queued", tone: "quiet" },
-  running: { word: "Running", tone: "busy" },
-  done: { word: "Done", tone: "good" },
-  failed: { word: "Failed", tone: "bad" },
-  cancelled: { word: "Cancelled", tone: "quiet" },
+  queued: quiet("Queued"),
+  running: busy("Running"),
+  done: good("Done"),
+  failed: bad("Failed"),
+  cancelled: quiet("Cancelled"),
 };
 
 export function isUnderWay({ state }: Pick<Job, "state">): boolean {

@@ -9,7 +9,6 @@ import { DataTable } from "../../ui/DataTable";
 import { gainText, stopped } from "../../ui/format";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
-import row from "../../ui/RowCard.module.css";
 import classes from "./LogAnalysis.module.css";
 import { StartCampaign } from "./StartCampaign";
 
@@ -103,12 +102,12 @@ function Answer({ title, answer, good, facts, table, label, notes, figures = [],
           {answer}
         </Text>
         {facts.map(([name, values]) => (
-          <p key={name} className={`${row["facts"]} numbers`}>
+          <Group key={name} component="p" gap="2px 14px" c="dimmed" fz="small" className="numbers">
             <b>{name}</b>
             {values.map((fact) => (
               <span key={fact}>{fact}</span>
             ))}
-          </p>
+          </Group>
         ))}
         <DataTable table={{ columns, rows: table.rows }} label={label} height={ROW_PX * (table.rows.length + 1)} />
         <ul className={page["notes"]}>
@@ -121,7 +120,7 @@ function Answer({ title, answer, good, facts, table, label, notes, figures = [],
         </Group>
       </Panel>
       <SimpleGrid
-        className={classes["figures"] ?? ""}
+        className={classes["figures"]}
         type="container"
         cols={{ base: 1, "860px": figures.length }}
         spacing="var(--gap)"

@@ -1,6 +1,6 @@
 import { Button, FileButton, Group, Skeleton, Text, TextInput, Title } from "@mantine/core";
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
-import { type FormEvent, useRef, useState } from "react";
+import { useRef, useState } from "react";
 import { ANALYSED_FILES, type AnalysedLog, useAnalyzeLog } from "../../api/logAnalyses";
 import { problemOf } from "../../api/problems";
 import { recordOf } from "../../api/records";
@@ -93,12 +93,8 @@ export function LogAnalysisPage() {
 
 /** Input for the gains of a log that does not contain them. */
 function GainsAsked({ name, onGains }: { name: string; onGains: (gains: string) => void }) {
-  const submit = (event: FormEvent<HTMLFormElement>) => {
-    event.preventDefault();
-    onGains(String(new FormData(event.currentTarget).get("gains")).replaceAll(/\s+/g, ""));
-  };
   return (
-    <form onSubmit={submit}>
+    <form action={(entered) => onGains(String(entered.get("gains")).replaceAll(/\s+/g, ""))}>
       <Group gap={10} mt={10} align="end">
         <TextInput name="gains" label="Gains flown: kp, ki, kd" placeholder="283, 13, 82" required />
         <Button type="submit">Analyse {name} with these gains</Button>

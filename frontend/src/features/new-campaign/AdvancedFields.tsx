@@ -49,7 +49,7 @@ export function AdvancedFields({ form, catalogue }: Props) {
         <SegmentedControl
           aria-label="Stop rule"
           size="md"
-          className={classes["wide"] ?? ""}
+          className={classes["wide"]}
           orientation={narrow ? "vertical" : "horizontal"}
           data={Object.entries(STOPS).map(([value, { label }]) => ({ value, label }))}
           {...form.getInputProps("definition.stop.kind", { withError: false })}

@@ -58,7 +58,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
         onClick={() =>
           // The same vehicle keeps its settings, another one starts from its own defaults.
           clone.mutate(
-            { warmStart: warm, ...(vehicle === ownKey ? {} : { vehicle: choice }) },
+            { warm_start: warm, vehicle: vehicle === ownKey ? undefined : choice },
             { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
           )
         }

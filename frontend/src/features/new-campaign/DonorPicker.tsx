@@ -25,7 +25,7 @@ export function DonorPicker({ experiment, label, value: donor = null, error, onC
   const [sought] = useDebouncedValue(search.trim(), 200);
   const found = useCampaigns({ search: sought, state: [], vehicle: [], sort: "-updated" });
   const unit = useUnits(experiment).error;
-  const usable = (found.data?.pages.flatMap((page) => page.items) ?? []).filter(
+  const usable = (found.data?.items ?? []).filter(
     (campaign) => campaign.best !== null && campaign.experiment === experiment,
   );
   const choose = (chosen: CampaignSummary): void => {

@@ -20,7 +20,7 @@ import {
   gainsOf,
   presetOf,
   requestFrom,
-  type StartKind,
+  STARTS,
   startingForm,
   startsFor,
   strategiesFor,
@@ -55,13 +55,6 @@ export function NewCampaignPage() {
 }
 
 const NO_PRESET = { value: "", label: "Own settings" };
-
-const STARTS: Record<StartKind, string> = {
-  default: "The vehicle's default gains",
-  simplex: "Best gains on the model (simplex)",
-  campaign: "Best gains of another campaign",
-  given: "Custom gains",
-};
 
 interface FormProps {
   catalogue: Catalogue;

@@ -2,8 +2,8 @@
 
 import type { Catalogue, Gain, OptionInfo } from "../../api/types";
 import type { NumberEntry, NumberFieldProps } from "../../ui/Fields";
-import { unitsOf } from "../../ui/units";
-import { type CampaignForm, experimentOf, gainsOf } from "./newCampaign";
+import { experimentOf, unitsOf } from "../../ui/units";
+import { type CampaignForm, gainsOf } from "./newCampaign";
 
 export interface NumberInfo {
   path: string;

@@ -14,6 +14,7 @@ import type {
   VehicleKindInfo,
 } from "../../api/types";
 import { type NumberEntry, numbersOf, type OptionValue } from "../../ui/Fields";
+import { experimentOf } from "../../ui/units";
 
 export type StartKind = Definition["start"]["kind"];
 export type StopKind = Definition["stop"]["kind"];
@@ -35,13 +36,17 @@ export interface CampaignForm {
   };
 }
 
-export function experimentOf(catalogue: Catalogue, experiment: string) {
-  return catalogue.experiments.find(({ name }) => name === experiment);
-}
-
 export function gainsOf(catalogue: Catalogue, experiment: string): readonly Gain[] {
   return experimentOf(catalogue, experiment)?.gains ?? [];
 }
+
+/** Where the first gains come from. */
+export const STARTS: Record<StartKind, string> = {
+  default: "The vehicle's default gains",
+  simplex: "Best gains on the model (simplex)",
+  campaign: "Best gains of another campaign",
+  given: "Custom gains",
+};
 
 /** Available sources of the first gains: a search on the model only where it is a strategy too. */
 export function startsFor(catalogue: Catalogue, experiment: string): StartKind[] {

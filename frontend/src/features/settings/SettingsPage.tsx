@@ -45,7 +45,7 @@ export function SettingsPage() {
         Settings
       </Title>
       <SimpleGrid type="container" cols={{ base: 1, "780px": 2 }} spacing="var(--gap)">
-        <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
+        <Stack gap="var(--gap)" className={classes["column"]}>
           <Panel title="This browser">
             <ThisBrowser />
           </Panel>
@@ -57,7 +57,7 @@ export function SettingsPage() {
             {system.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
           </div>
         ) : (
-          <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
+          <Stack gap="var(--gap)" className={classes["column"]}>
             <Panel title="Open on a tablet">
               <Stack gap={18}>
                 {system.data.addresses.length > 0 ? (

@@ -2,15 +2,29 @@ import { Group } from "@mantine/core";
 import { IconAlertTriangle, IconCircleArrowDown, IconCircleArrowUp, IconCircleCheck } from "@tabler/icons-react";
 import type { Trial } from "../../../api/types";
 import { marksOf, predictionResult } from "../verdict/verdict";
-import classes from "./FlightMarkers.module.css";
+
+/** An icon with a few words. */
+const IN_LINE = { display: "inline-flex", gap: 4, wrap: "nowrap", fz: "fine", className: "quantity" } as const;
 
 /** Markers of special flights: refused gains that were flown, glitches in the record. */
 export function FlightMarkers({ trial }: { trial: Trial }) {
   return marksOf(trial).map((mark) => (
-    <span key={mark} className={classes["mark"]} title={trial.overrule_reason || undefined}>
+    <Group
+      key={mark}
+      component="span"
+      {...IN_LINE}
+      px={8}
+      py={1}
+      bd="1px solid var(--warn)"
+      bdrs={999}
+      bg="var(--warn-soft)"
+      c="var(--warn)"
+      fw={650}
+      title={trial.overrule_reason}
+    >
       <IconAlertTriangle size={15} aria-hidden />
       {mark}
-    </span>
+    </Group>
   ));
 }
 
@@ -25,11 +39,8 @@ export function PredictionResult({ trial, brief = false }: { trial: Trial; brief
   return (
     <Group
       component="span"
-      display="inline-flex"
-      gap={3}
-      wrap="nowrap"
+      {...IN_LINE}
       c={result === "inside" ? "var(--best)" : "var(--warn)"}
-      fz="fine"
       fw={550}
       title={brief ? label : ""}
     >

@@ -1,4 +1,5 @@
 import { ActionIcon, Box, Button, FileButton, Group, InputBase, Stack } from "@mantine/core";
+import { readSessionStorageValue, useSessionStorage } from "@mantine/hooks";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../../api/records";
@@ -18,7 +19,7 @@ export interface NotePin {
 interface Props {
   trial: Trial;
   /** A new pin adds its line to the note. */
-  pin?: NotePin | null | undefined;
+  pin?: NotePin | null;
 }
 
 /** Note and photos of a flight; a tablet takes photos with its camera. */
@@ -27,7 +28,7 @@ export function FlightNotes({ trial, pin = null }: Props) {
   const { add, remove } = usePhotoActions(trial.id);
   const [asked, setAsked] = useState<number | null>(null);
   const doomed = photos.findIndex(({ id }) => id === asked);
-  const [hasDraft] = useState(() => draftOf(trial.id, trial.note) !== trial.note);
+  const [hasDraft] = useState(() => readSessionStorageValue({ key: keyOf(trial) }) !== undefined);
   const kept = hasDraft || trial.note !== "" || photos.length > 0 || pin !== null;
   return (
     <details open={kept || undefined}>
@@ -93,7 +94,11 @@ export function FlightNotes({ trial, pin = null }: Props) {
 }
 
 function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
-  const [note, setNote] = useState(() => draftOf(trial.id, trial.note));
+  const [note, setNote, forget] = useSessionStorage({
+    key: keyOf(trial),
+    defaultValue: trial.note,
+    getInitialValueInEffect: false,
+  });
   const text = useRef<HTMLTextAreaElement>(null);
   const pinned = useRef(pin);
   useEffect(() => {
@@ -101,9 +106,9 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
     pinned.current = pin;
     setNote((before) => withPin(before, pin.timeS));
     text.current?.focus();
-  }, [pin]);
-  useEffect(() => keepDraft(trial.id, note, trial.note), [trial.id, trial.note, note]);
-  const save = useNote(trial, (sent) => forgetDraft(trial.id, sent));
+  }, [pin, setNote]);
+  // What was typed since is kept; the field shows what was sent until the trial has it.
+  const save = useNote(trial, (sent) => note === sent && sessionStorage.removeItem(keyOf(trial)));
   const isTooLong = note.length > LONGEST_NOTE;
   return (
     <Stack
@@ -120,14 +125,14 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
         component="textarea"
         ref={text}
         w="100%"
-        classNames={{ input: classes["text"] ?? "" }}
+        classNames={{ input: classes["text"] }}
         description="A line that starts with a time, such as “2.4 s: wobble”, is marked on the record chart."
         multiline
         label={`Note on flight ${trial.number}`}
         rows={2}
         error={isTooLong}
         value={note}
-        onChange={(event) => setNote(event.currentTarget.value)}
+        onChange={({ currentTarget: { value } }) => (value === trial.note ? forget() : setNote(value))}
       />
       {note.length >= COUNTED_FROM && (
         <p role="status" className="numbers">
@@ -150,20 +155,5 @@ function withPin(note: string, timeS: number): string {
   return `${before}${before && "\n"}${timeS.toFixed(1)} s: `;
 }
 
-/** Unsaved notes, by flight: kept in this tab while other pages are open. */
-const keyOf = (trialId: number): string => `note ${trialId}`;
-
-/** The unsaved text of a flight's note, else the saved one. */
-function draftOf(trialId: number, saved: string): string {
-  return sessionStorage.getItem(keyOf(trialId)) ?? saved;
-}
-
-function keepDraft(trialId: number, text: string, saved: string): void {
-  if (text === saved) sessionStorage.removeItem(keyOf(trialId));
-  else sessionStorage.setItem(keyOf(trialId), text);
-}
-
-/** Forget the text that was saved, but not what has been typed since. */
-function forgetDraft(trialId: number, sent: string): void {
-  if (sessionStorage.getItem(keyOf(trialId)) === sent) sessionStorage.removeItem(keyOf(trialId));
-}
+/** Where the unsaved note of a flight is kept in this tab while other pages are open. */
+const keyOf = ({ id }: Trial): string => `note ${id}`;

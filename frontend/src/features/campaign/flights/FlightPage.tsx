@@ -1,4 +1,4 @@
-import { Anchor, Box, Button, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Box, Button, Skeleton, Title } from "@mantine/core";
 import { IconPin } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
 import { Link, Navigate, useNavigate, useParams } from "react-router";
@@ -34,11 +34,10 @@ function recordHeight(card: FigureCard | undefined): number {
 
 /** One flight: its curve and commands, then its verdict. */
 function FlightById({ campaignId, trialId }: { campaignId: number; trialId: number }) {
-  const theme = useComputedColorScheme("light");
   const campaign = useCampaign(campaignId).data;
   const trial = useTrial(trialId);
   const trials = useTrials(campaignId).data ?? [];
-  const figure = useFlightFigure(trialId, theme);
+  const figure = useFlightFigure(trialId);
   const hasSeed = campaign?.vehicle.can_fly && !campaign.vehicle.registered;
   const [pinning, setPinning] = useState(false);
   const [pin, setPin] = useState<NotePin | null>(null);

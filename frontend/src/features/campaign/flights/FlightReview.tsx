@@ -34,7 +34,7 @@ interface Props {
 export function FlightReview({ trial, trials, campaign }: Props) {
   const [asking, setAsking] = useState(false);
   const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
-  const classify = useClassify();
+  const classify = useClassify(trial);
   const isEndedByRule = campaign?.state === "finished" && campaign.outcome !== "stopped";
   const suggestion = suggestedClass(trial);
   const isSuggested = (outcome: FlightClass) => outcome === suggestion?.outcome;
@@ -49,7 +49,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
       return;
     }
     const by = trial.state === "invalid" ? "restored by the operator" : "reviewed by the operator";
-    classify.mutate({ trial, outcome, reason: (outcome === "invalid" && suggestion?.why) || by });
+    classify.mutate({ outcome, reason: (outcome === "invalid" && suggestion?.why) || by });
   }
 
   if (asking) {
@@ -60,7 +60,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
         {...BOX}
         onSubmit={(event) => {
           event.preventDefault();
-          classify.mutate({ trial, outcome: "invalid", reason });
+          classify.mutate({ outcome: "invalid", reason });
         }}
       >
         <Note fz="body">
@@ -71,7 +71,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
           <Group gap={8}>
             {INVALID_REASONS.map((one) => (
-              <Chip key={one} value={one} variant="outline" classNames={{ label: classes["chip"] ?? "" }}>
+              <Chip key={one} value={one} variant="outline" classNames={{ label: classes["chip"] }}>
                 {one}
               </Chip>
             ))}
@@ -124,7 +124,7 @@ const LABELS = { "behaved badly": "Vehicle behaviour", "something else": "Other 
 
 /** Whether an aborted flight counts against its gains, with buttons for the cause. */
 export function AbortCause({ trial }: { trial: Trial }) {
-  const judge = useJudgeAbort();
+  const judge = useJudgeAbort(trial);
   const causes = abortWords(trial);
   const sentence = abortSentence(trial);
   if (sentence === "") return null;
@@ -137,12 +137,7 @@ export function AbortCause({ trial }: { trial: Trial }) {
         <Stack gap={8}>
           {trial.abort_cause !== "operator" && <small>Change the cause to:</small>}
           {causes.map((cause) => (
-            <Button
-              key={cause}
-              variant="default"
-              loading={judge.isPending}
-              onClick={() => judge.mutate({ trial, cause })}
-            >
+            <Button key={cause} variant="default" loading={judge.isPending} onClick={() => judge.mutate(cause)}>
               {LABELS[cause]}
             </Button>
           ))}

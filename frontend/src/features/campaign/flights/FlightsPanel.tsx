@@ -54,15 +54,13 @@ function CompareLink({ campaign, selected }: Pick<TableProps, "campaign" | "sele
   );
 }
 
-const NO_TITLES: Readonly<Record<string, string>> = {};
-
 function flightOf(target: EventTarget): number | null {
   const row = target instanceof Element ? target.closest<HTMLElement>("[data-flight]") : null;
   return row === null ? null : Number(row.dataset["flight"]);
 }
 
 function TrialsTable({ campaign, trials, shown, unit, onChoose, selected, onSelect }: TableProps) {
-  const titles = useGainTitles(campaign.definition.experiment ?? "") ?? NO_TITLES;
+  const titles = useGainTitles(campaign.definition.experiment);
   const columns = useMemo(() => flightColumns(trials, titles, unit), [trials, titles, unit]);
   /** Columns that this browser shows other than by default: extra ones shown, others hidden. */
   const [changed, setChanged] = useLocalStorage<string[]>({

@@ -52,12 +52,7 @@ export function ImportRecord({ upload, target }: Props) {
       </FileButton>
       <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid"]} />
       {takeoffsIn(problem).map(({ number, summary }) => (
-        <Button
-          key={number}
-          variant="default"
-          className={page["wrapping"] ?? ""}
-          onClick={() => again({ takeoff: number })}
-        >
+        <Button key={number} variant="default" className={page["wrapping"]} onClick={() => again({ takeoff: number })}>
           Takeoff {number}: {summary}
         </Button>
       ))}

@@ -1,6 +1,6 @@
 /** Texts and decisions about the review of a flight: its class, the consequences, and the cause of an abort. */
 
-import type { Trial } from "../../../api/types";
+import type { Classification, Trial } from "../../../api/types";
 import { flightsText } from "../../../ui/format";
 import { sameHeld } from "../../../ui/gains";
 import { bestOfCounted } from "../verdict/verdict";
@@ -57,7 +57,7 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];
 
 /** Class of a reviewed flight. */
-export type FlightClass = "valid" | "aborted" | "invalid";
+export type FlightClass = Classification["outcome"];
 
 const OTHERS: Partial<Record<Trial["state"], FlightClass[]>> = {
   valid: ["invalid"],

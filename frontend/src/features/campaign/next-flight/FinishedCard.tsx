@@ -16,7 +16,6 @@ import { useUnits } from "../../../ui/units";
 import { CloneForm } from "../../new-campaign/CloneForm";
 import { ArchiveCampaign } from "../EndCampaign";
 import { PromoteGains } from "../verdict/PromoteGains";
-import { VERDICTS } from "../verdict/verdict";
 import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
 
 const FURTHER_FLIGHTS = 3;
@@ -86,7 +85,7 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
         )}
         <PromoteGains campaign={campaign} />
         <Note fz="body">A clone is a new campaign with the same settings.</Note>
-        <CloneForm {...campaign} experiment={campaign.definition.experiment ?? ""} bestFlight={bestFlight} />
+        <CloneForm {...campaign} experiment={campaign.definition.experiment} bestFlight={bestFlight} />
         {campaign.actions.includes("archive") && <ArchiveCampaign campaignId={campaign.id} />}
       </Stack>
     </Panel>
@@ -107,7 +106,7 @@ interface ResultProps {
 
 /** The best gains beside the first, each with the mean of all its flights. */
 function Result({ campaign, winner, first, comparison }: ResultProps) {
-  const experiment = campaign.definition.experiment ?? "";
+  const experiment = campaign.definition.experiment;
   const unit = useUnits(experiment).error;
   const change = percentChange(winner.mean, first.mean);
   const standing = campaign.standing && STANDINGS[campaign.standing];
@@ -128,7 +127,7 @@ function Result({ campaign, winner, first, comparison }: ResultProps) {
           <p>
             {against(change, "the first gains")} ·{" "}
             <strong>
-              {VERDICTS[comparison.verdict].toLowerCase()}
+              {comparison.verdict}
               {comparison.confidence !== null && ` with ${confidenceText(comparison.confidence)} confidence`}
             </strong>
           </p>

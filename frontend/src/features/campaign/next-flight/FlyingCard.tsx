@@ -30,7 +30,7 @@ export function FlyingCard({ campaign, trials, flight }: Props) {
   const abort = useOutletContext<AbortControl>();
   const { state, worker } = useConnection();
   const live = useLiveFlight(trialId);
-  const unit = useUnits(campaign.definition.experiment ?? "").error;
+  const unit = useUnits(campaign.definition.experiment).error;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
   const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
@@ -69,7 +69,7 @@ export function FlyingCard({ campaign, trials, flight }: Props) {
         </dl>
         {trial && (
           <Note fz="body" className="numbers">
-            <GainList gains={trial.gains} experiment={campaign.definition.experiment ?? ""} />
+            <GainList gains={trial.gains} experiment={campaign.definition.experiment} />
             {trial.read_back && ", read back from the vehicle"}
           </Note>
         )}

@@ -1,5 +1,6 @@
 import { Button, Group, Loader, Stack, Text } from "@mantine/core";
 import { useRecompute, useUploadRecord } from "../../../api/mutations";
+import { localProblem } from "../../../api/problems";
 import { useCampaign } from "../../../api/queries";
 import type { Trouble } from "../../../api/types";
 import { ErrorNotice } from "../../../ui/Notices";
@@ -77,7 +78,7 @@ function Step(props: Props & { isSecondary?: boolean }) {
         </Panel>
       );
     case "failed":
-      return <FailedCard campaignId={campaign.id} problem={step.problem ?? UNKNOWN} />;
+      return <FailedCard campaignId={campaign.id} problem={step.problem} />;
     case "computing":
       return (
         <Panel title="Next flight">
@@ -94,14 +95,13 @@ function Step(props: Props & { isSecondary?: boolean }) {
   }
 }
 
-const UNKNOWN: Trouble = { title: "The next gains could not be computed.", detail: "", hint: "" };
-
-function FailedCard({ campaignId, problem }: { campaignId: number; problem: Trouble }) {
+function FailedCard({ campaignId, problem }: { campaignId: number; problem: Trouble | null }) {
+  const { title = "The next gains could not be computed.", detail, hint } = problem ?? {};
   const recompute = useRecompute(campaignId);
   return (
     <Panel title="Next flight">
       <Stack gap={14}>
-        <ErrorNotice error={{ ...problem, status: 0, problems: [] }} />
+        <ErrorNotice error={localProblem(title, detail, hint)} />
         <Button loading={recompute.isPending} onClick={() => recompute.mutate()}>
           Compute again
         </Button>

@@ -24,7 +24,7 @@ interface Props {
 /** A planned trial: fly it, upload its record, or cancel it. */
 export function PlannedCard({ campaign, trial, upload }: Props) {
   const speed = useSpeed();
-  const experiment = campaign.definition.experiment ?? "";
+  const experiment = campaign.definition.experiment;
   const unit = useUnits(experiment).error;
   const titles = useGainTitles(experiment);
   const fly = useFlyTrial(campaign);

@@ -13,7 +13,7 @@ import page from "../CampaignPage.module.css";
 export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   const navigate = useNavigate();
   const rehearse = useRehearse(campaign.id);
-  const hasModel = useHasModel(campaign.definition.experiment ?? "takeoff");
+  const hasModel = useHasModel(campaign.definition.experiment);
   const { state, campaign_id, reason } = campaign.rehearsal;
   return (
     <Panel title="Rehearse first">
@@ -63,7 +63,7 @@ export function RehearsalNote({ real }: { real: Campaign }) {
   if (real.rehearsal.state === "passed") {
     return (
       <Panel title="Rehearsal passed">
-        <Button component={Link} to={`/campaigns/${real.id}`} fullWidth size="lg" className={page["wrapping"] ?? ""}>
+        <Button component={Link} to={`/campaigns/${real.id}`} fullWidth size="lg" className={page["wrapping"]}>
           Open {real.name}
         </Button>
       </Panel>

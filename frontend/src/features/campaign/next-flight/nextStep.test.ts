@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Campaign, NextFlight, Proposal, Trial } from "../../../api/types";
-import { flyingStage, isWithdrawnByOperator, nextStep, STAGED } from "./nextStep";
+import { flyingStage, isWithdrawnByOperator, type NextStep, nextStep, STAGED } from "./nextStep";
 
 const campaign = {
   state: "deciding",
@@ -13,12 +13,38 @@ const proposal = { kind: "step", recommended: "step", stale: false } as unknown 
 const ready: NextFlight = { state: "ready", proposal, problem: null };
 const trial = (id: number, state: Trial["state"]): Trial => ({ id, state }) as unknown as Trial;
 
-test("a fresh proposal is what to do next", () => {
-  expect(nextStep(campaign, ready, [trial(7, "valid")])).toEqual({ kind: "propose", proposal });
-});
+const rehearsed = (state: string) => ({ ...campaign, rehearsal: { state } }) as unknown as Campaign;
+const planned = trial(8, "planned");
+const lost = trial(8, "lost");
+const captured = trial(8, "captured");
+const stale: NextFlight = { ...ready, proposal: { ...proposal, stale: true } };
+const problem = { title: "No.", detail: "", hint: "" };
+const unknown = { proposal: null, problem };
 
-test("what flies comes before everything else", () => {
-  expect(nextStep(flying, ready, [trial(8, "flying")])).toEqual({ kind: "flying", flight: flying.flying });
+test.each<[says: string, campaign: Campaign, next: NextFlight, trials: Trial[], step: NextStep]>([
+  ["a fresh proposal is next", campaign, ready, [trial(7, "valid")], { kind: "propose", proposal }],
+  ["what flies comes first", flying, ready, [trial(8, "flying")], { kind: "flying", flight: flying.flying }],
+  [
+    "what has landed flies no more, however old the campaign",
+    flying,
+    ready,
+    [trial(8, "valid")],
+    { kind: "computing" },
+  ],
+  ["what has landed is judged", flying, ready, [captured], { kind: "judge", trial: captured }],
+  ["a stale proposal is never offered", campaign, stale, [], { kind: "computing" }],
+  ["nor while another is computed", campaign, { ...stale, state: "computing" }, [], { kind: "computing" }],
+  ["what nobody has judged comes before", campaign, ready, [trial(7, "valid"), lost], { kind: "judge", trial: lost }],
+  ["a real vehicle is rehearsed first", rehearsed("missing"), ready, [planned], { kind: "rehearse" }],
+  ["also while its rehearsal flies", rehearsed("under way"), ready, [planned], { kind: "rehearse" }],
+  ["and again after one that failed", rehearsed("failed"), ready, [planned], { kind: "rehearse" }],
+  ["after the rehearsal it flies", rehearsed("passed"), ready, [], { kind: "propose", proposal }],
+  ["a planned trial waits for its flight or record", campaign, ready, [planned], { kind: "planned", trial: planned }],
+  ["what failed can be asked for again", campaign, { ...unknown, state: "failed" }, [], { kind: "failed", problem }],
+  ["and what was never asked for", campaign, { ...unknown, state: "none" }, [], { kind: "failed", problem }],
+  ["a finished campaign offers no flight", { ...campaign, state: "finished" }, ready, [], { kind: "finished" }],
+])("%s", (_says, campaign, next, trials, step) => {
+  expect(nextStep(campaign, next, trials)).toEqual(step);
 });
 
 test("a flight is in flight from its takeoff on, as the bar says, even before the first sample", () => {
@@ -29,44 +55,6 @@ test("a flight is in flight from its takeoff on, as the bar says, even before th
   expect(flyingStage(waiting, none)).toBe(STAGED);
   expect(flyingStage(trial(8, "staged"), { ...none, phase: "flying" })).toBe("In flight");
   expect(flyingStage(trial(8, "flying"), null)).toBe("In flight");
-});
-
-test("a flight that has landed is not flying any more, even if the campaign is not up to date yet", () => {
-  expect(nextStep(flying, ready, [trial(8, "valid")])).toEqual({ kind: "computing" });
-  expect(nextStep(flying, ready, [trial(8, "captured")])).toEqual({ kind: "judge", trial: trial(8, "captured") });
-});
-
-test("a stale proposal is never offered", () => {
-  const stale: NextFlight = { ...ready, state: "ready", proposal: { ...proposal, stale: true } };
-  expect(nextStep(campaign, stale, [])).toEqual({ kind: "computing" });
-  expect(nextStep(campaign, { ...stale, state: "computing" }, [])).toEqual({ kind: "computing" });
-});
-
-test("a flight that nobody has judged comes before the next one", () => {
-  const lost = trial(8, "lost");
-  expect(nextStep(campaign, ready, [trial(7, "valid"), lost])).toEqual({ kind: "judge", trial: lost });
-});
-
-test("a real vehicle's campaign is rehearsed before anything else is offered", () => {
-  const real = (state: string) => ({ ...campaign, rehearsal: { state } }) as unknown as Campaign;
-  for (const state of ["missing", "under way", "failed"]) {
-    expect(nextStep(real(state), ready, [trial(8, "planned")])).toEqual({ kind: "rehearse" });
-  }
-  expect(nextStep(real("passed"), ready, [])).toEqual({ kind: "propose", proposal });
-});
-
-test("a planned trial waits for its flight or its record", () => {
-  const planned = trial(8, "planned");
-  expect(nextStep(campaign, ready, [planned])).toEqual({ kind: "planned", trial: planned });
-});
-
-test.each(["failed", "none"] as const)("gains that could not be computed (%s) can be asked for again", (state) => {
-  const problem = { title: "No.", detail: "", hint: "" };
-  expect(nextStep(campaign, { state, proposal: null, problem }, [])).toEqual({ kind: "failed", problem });
-});
-
-test("a finished campaign offers no flight", () => {
-  expect(nextStep({ ...campaign, state: "finished" }, ready, [])).toEqual({ kind: "finished" });
 });
 
 test("a flight that the operator unstaged did not fail", () => {

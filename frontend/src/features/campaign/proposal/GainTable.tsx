@@ -18,7 +18,7 @@ interface Props {
   from: "Best gains" | "Best in bounds" | "Safe gains";
   unit: string;
   /** Makes the next gains inputs. */
-  entry?: GainEntry | undefined;
+  entry?: GainEntry;
 }
 
 /** Gains of the best flight, else the vehicle's safe ones, and next, with the change of each as a factor and within the bounds. */
@@ -80,7 +80,7 @@ function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name
   return (
     <TextInput
       aria-label={name}
-      className={classes["entry"] ?? ""}
+      className={classes["entry"]}
       inputMode="decimal"
       autoComplete="off"
       value={texts[name] ?? ""}

@@ -15,7 +15,7 @@ import classes from "./Proposal.module.css";
 export function GateChecks({ gate }: { gate: Gate | null }) {
   if (gate === null) {
     return (
-      <Note className={classes["more"] ?? ""} mih={48} pt={12} role="status">
+      <Note className={classes["more"]} mih={48} pt={12} role="status">
         Running the gate checks…
       </Note>
     );
@@ -85,7 +85,7 @@ export function GateRefusal({ gate, onUse }: RefusalProps) {
   const limits = sentencesOf(offering);
   const others = reasons.filter((reason) => !limits.includes(reason));
   return (
-    <div className={notices["trouble"]} role="alert">
+    <div className={notices["notice"]} role="alert">
       <Stack gap={14} flex={1} miw={0}>
         <div>
           <strong>The gate refuses these gains.</strong>
@@ -93,7 +93,7 @@ export function GateRefusal({ gate, onUse }: RefusalProps) {
         </div>
         {onUse && limits.length > 0 && (
           <div>
-            <Button fullWidth variant="light" className={page["wrapping"] ?? ""} onClick={() => onUse(offer)}>
+            <Button fullWidth variant="light" className={page["wrapping"]} onClick={() => onUse(offer)}>
               Use {named(offer)}
             </Button>
             <OfferNote several={Object.keys(offer).length > 1} first={first} limits={limits} />

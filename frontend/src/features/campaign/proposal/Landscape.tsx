@@ -1,4 +1,3 @@
-import { useComputedColorScheme } from "@mantine/core";
 import { useState } from "react";
 import { useLandscape } from "../../../api/queries";
 import type { FigureCard } from "../../../api/types";
@@ -19,8 +18,7 @@ function heightOf(card: FigureCard | undefined): number {
 /** The gains as a path over the model's error. It is requested, and so computed, once it is opened. */
 export function Landscape({ campaignId }: { campaignId: number }) {
   const [isOpen, setOpen] = useState(false);
-  const theme = useComputedColorScheme("light");
-  const { data: card, error } = useLandscape(campaignId, theme, isOpen);
+  const { data: card, error } = useLandscape(campaignId, isOpen);
   return (
     <More summary="Error landscape" onToggle={(event) => setOpen(event.currentTarget.open)}>
       {isOpen && (

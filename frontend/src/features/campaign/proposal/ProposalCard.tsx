@@ -1,15 +1,16 @@
-import { Button, Stack } from "@mantine/core";
+import { Button, Chip, Group, Stack } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useReadOnlyReason } from "../../../api/access";
 import type { GainSet } from "../../../api/evaluation";
 import type { RecordUpload } from "../../../api/mutations";
+import { formProblem } from "../../../api/problems";
 import { useStatistics } from "../../../api/queries";
 import type { Campaign, CampaignStatistics, Proposal, Trial } from "../../../api/types";
 import { useConnection } from "../../../live/store";
 import { flightsText } from "../../../ui/format";
 import { sameHeld } from "../../../ui/gains";
 import { Note } from "../../../ui/Note";
-import { ErrorNotice, FormErrorNotice } from "../../../ui/Notices";
+import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { useHasModel, useUnits } from "../../../ui/units";
 import { DeleteCampaign, StopCampaign } from "../EndCampaign";
@@ -17,8 +18,7 @@ import { ImportRecord } from "../flights/ImportRecord";
 import { FlightWindow, GroundedNote, useGroundedReason } from "../next-flight/BeforeFlight";
 import { SpeedSwitch, useSpeed } from "../next-flight/speed";
 import { isPriorScatter } from "../statistics/scatter";
-import { isDoubtful, isRepeat, repeatSource } from "./choices";
-import { FlightChoices } from "./FlightChoices";
+import { CHOICES, type ChoiceName, isDoubtful, isRepeat, repeatSource } from "./choices";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal, OverruleGate } from "./Gate";
 import classes from "./Proposal.module.css";
@@ -42,7 +42,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isReadOnly = useReadOnlyReason(null) !== null;
   const chosen = useChosenFlight(campaign, proposal, onPreview, isReadOnly);
   const { gains, gate, prediction, rows } = chosen;
-  const experiment = campaign.definition.experiment ?? "";
+  const experiment = campaign.definition.experiment;
   const units = useUnits(experiment);
   const hasModel = useHasModel(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
@@ -55,6 +55,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const reference = groupOf(Object.fromEntries(rows.map(({ name, now }) => [name, now])));
   const best = groups.find(({ is_best }) => is_best);
   const isBestOutside = best !== undefined && reference !== undefined && best !== reference;
+  const labels = chosen.entry ? Object.fromEntries(rows.map(({ name }) => [name, name])) : {};
   const isAgain = isRepeat(chosen.name);
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
@@ -84,16 +85,13 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             hasModel={hasModel}
           />
         )}
-        <Stack gap={10} className={classes["later"] ?? ""}>
+        <Stack gap={10} className={classes["later"]}>
           {isEvaluated && prediction.result?.interval && isAgain && group && isPriorScatter(statistics) && (
             <Note>The interval assumes the prior estimate of the scatter: no gain set has two valid flights.</Note>
           )}
           <FlightWindow definition={campaign.definition} />
         </Stack>
-        <FormErrorNotice
-          error={chosen.error}
-          labels={chosen.entry ? Object.fromEntries(rows.map(({ name }) => [name, name])) : {}}
-        />
+        <ErrorNotice error={formProblem(chosen.error, labels)} shown={Object.keys(labels)} />
         {refusal && <GateRefusal gate={refusal} onUse={chosen.entry && chosen.use} />}
         <FlightButtons
           campaign={campaign}
@@ -121,6 +119,39 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         {campaign.actions.includes("delete") && <DeleteCampaign campaign={campaign} />}
       </Stack>
     </Panel>
+  );
+}
+
+interface ChoicesProps {
+  proposal: Proposal;
+  chosen: ChoiceName;
+  disabled: boolean;
+  onChoose: (choice: ChoiceName) => void;
+}
+
+/** One choice of what to fly next. */
+function FlightChoices({ proposal, chosen, disabled, onChoose }: ChoicesProps) {
+  const recommended = proposal.choices.find(
+    (choice) => choice.recommended && (!choice.proposed || proposal.gate.passed),
+  )?.kind;
+  return (
+    <Chip.Group value={chosen} onChange={(name) => onChoose(name as ChoiceName)}>
+      <Group gap={8} role="radiogroup" aria-label="Gains to fly">
+        {[...proposal.choices.map(({ kind }) => kind), "own" as const].map((name) => (
+          <Chip
+            key={name}
+            name="gains-to-fly"
+            value={name}
+            disabled={disabled}
+            variant="outline"
+            classNames={{ label: classes["choice"] }}
+          >
+            {CHOICES[name].label}
+            {name === recommended && " (recommended)"}
+          </Chip>
+        ))}
+      </Group>
+    </Chip.Group>
   );
 }
 

@@ -5,9 +5,8 @@ import { Aside } from "../../../ui/Aside";
 import { against, gainText, NOTHING, percentChange, trueMinus, withUnit } from "../../../ui/format";
 import { gainsInBrackets } from "../../../ui/gains";
 import { HelpTip } from "../../../ui/HelpTip";
+import { ListTable } from "../../../ui/ListTable";
 import { Note } from "../../../ui/Note";
-import { ScrollTable } from "../../../ui/ScrollTable";
-import table from "../../../ui/ScrollTable.module.css";
 import { intervalText, percent, plusMinus } from "../../../ui/uncertainty";
 import { CHOICES, type ChoiceName, isDoubtful } from "./choices";
 import { Landscape } from "./Landscape";
@@ -42,7 +41,7 @@ export function PredictedError({ prediction, best, bestTitle, source, unit, hasM
   const change = percentChange(error, best);
   if (error === null && isCurrent) {
     return (
-      <Note fz="body" className={hasModel ? "" : (classes["later"] ?? "")}>
+      <Note fz="body" className={hasModel ? "" : classes["later"]}>
         {unpredicted(best, hasModel)}
       </Note>
     );
@@ -91,7 +90,7 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
       </Aside>
     );
   }
-  const later = classes["later"] ?? "";
+  const later = classes["later"];
   const { hint } = CHOICES[chosen];
   if (!isStop && !(isRecommended && proposal.gate.passed)) {
     return (
@@ -126,9 +125,9 @@ interface ProposalDetailsProps {
 /** Details of the proposed gains: why these, what the model says of others, and the steps evaluated on it. */
 export function ProposalDetails({ proposal, campaignId, said, unit, hasModel }: ProposalDetailsProps) {
   const { explanation, gains } = proposal;
-  const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
+  const { clipped, notes, lesson, fitted, trust_fraction: trust } = explanation;
   const summary = said.includes(explanation.summary) ? "" : explanation.summary;
-  const isModelled = Object.keys(explanation.gradient ?? {}).length > 0 || fitted.length > 0;
+  const isModelled = Object.keys(explanation.gradient).length > 0 || fitted.length > 0;
   const isExplained = hasModel || notes.length > 0 || lesson !== "" || summary !== "";
   return (
     <>
@@ -197,7 +196,7 @@ interface TriedProps {
 
 /** The gradient, and the steps evaluated along it. */
 function Tried({ explanation, unit, gains }: TriedProps) {
-  const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
+  const { gradient, ladder, chosen_length: chosen } = explanation;
   const slopes = Object.entries(gradient);
   if (slopes.length + ladder.length === 0) return null;
   return (
@@ -210,26 +209,19 @@ function Tried({ explanation, unit, gains }: TriedProps) {
         </span>
       )}
       {ladder.length > 0 && (
-        <ScrollTable label="Steps evaluated on the model" className={`${table["numeric"]} ${classes["ladder"]}`}>
-          <thead>
-            <tr>
-              <th scope="col">Step</th>
-              <th scope="col">[{Object.keys(gains).join(" ")}]</th>
-              <th scope="col">Predicted</th>
-              <th scope="col">Limit</th>
-            </tr>
-          </thead>
-          <tbody>
-            {ladder.map((step) => (
-              <tr key={step.length} data-chosen={step.length === chosen || undefined}>
-                <td>{gainText(step.length)}</td>
-                <td>{gainsInBrackets(step.gains)}</td>
-                <td>{withUnit(step.predicted_error, unit)}</td>
-                <td>{step.clipped?.join(", ") || NOTHING}</td>
-              </tr>
-            ))}
-          </tbody>
-        </ScrollTable>
+        <ListTable
+          label="Steps evaluated on the model"
+          className={classes["ladder"]}
+          rows={ladder}
+          keyOf={({ length }) => String(length)}
+          marks={({ length }) => ({ "data-chosen": length === chosen || undefined })}
+          columns={[
+            { title: "Step", cell: ({ length }) => gainText(length) },
+            { title: `[${Object.keys(gains).join(" ")}]`, cell: (step) => gainsInBrackets(step.gains) },
+            { title: "Predicted", cell: ({ predicted_error }) => withUnit(predicted_error, unit) },
+            { title: "Limit", cell: ({ clipped }) => clipped.join(", ") || NOTHING },
+          ]}
+        />
       )}
     </More>
   );

@@ -1,4 +1,4 @@
-import { describe, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import type { FlightChoice, Proposal } from "../../../api/types";
 import { isDoubtful, preselected, repeatSource, trialOf } from "./choices";
 
@@ -17,28 +17,15 @@ function proposal(...choices: FlightChoice[]): Proposal {
   return { id: 7, gains: next, choices } as unknown as Proposal;
 }
 
-describe("what is chosen at first", () => {
-  test("is what is recommended", () => {
-    expect(preselected(proposal(step, { ...repeat, recommended: true }))).toBe("repeat");
-  });
-
-  test("is the proposal where the campaign should stop", () => {
-    expect(preselected(proposal(step, repeat))).toBe("step");
-  });
+test("the recommendation is chosen at first, else, where the campaign should stop, the proposal", () => {
+  expect(preselected(proposal(step, { ...repeat, recommended: true }))).toBe("repeat");
+  expect(preselected(proposal(step, repeat))).toBe("step");
 });
 
-describe("what the button flies", () => {
-  test("is the proposal by its number, so that the flight keeps the prediction", () => {
-    expect(trialOf(proposal(step), step, next)).toEqual({ proposal_id: 7 });
-  });
-
-  test("is a variant with the gains that are shown, so that no others fly", () => {
-    expect(trialOf(proposal(step, repeat), repeat, best)).toEqual({ variant: "repeat", gains: best });
-  });
-
-  test("is the gains that were typed", () => {
-    expect(trialOf(proposal(step), undefined, first)).toEqual({ gains: first });
-  });
+test("the button flies the proposal by its number, to keep its prediction, otherwise the gains that are shown", () => {
+  expect(trialOf(proposal(step), step, next)).toEqual({ proposal_id: 7 });
+  expect(trialOf(proposal(step, repeat), repeat, best)).toEqual({ variant: "repeat", gains: best });
+  expect(trialOf(proposal(step), undefined, first)).toEqual({ gains: first });
 });
 
 test("a repeat says of which flights it predicts the mean", () => {

@@ -57,12 +57,7 @@ export function useChosenFlight(campaign: Campaign, proposal: Proposal, onPrevie
   const gains = choice === undefined ? own.gains : choice.gains;
   const isProposal = choice?.proposed === true;
   const asked = useEvaluation(campaign.id, proposal.id, isProposal || isReadOnly ? null : gains);
-  const rows = gainRows(
-    proposal,
-    choice === undefined ? own.values : choice.gains,
-    known,
-    campaign.definition.bounds ?? {},
-  );
+  const rows = gainRows(proposal, choice === undefined ? own.values : choice.gains, known, campaign.definition.bounds);
   const isOut = rows.some(isOutside);
   const { result, isCurrent } = asked.prediction;
   const predicted = useMemo(() => (isOut && result ? { ...result, ...NOTHING_PREDICTED } : result), [isOut, result]);

@@ -67,7 +67,7 @@ function Results(all: CampaignStatistics) {
 interface FactProps {
   title: string;
   topic?: Topic;
-  tone?: "good" | "bad" | undefined;
+  tone?: "good" | "bad";
   value: string;
   /** What the value is. */
   remark?: string | false;
@@ -108,7 +108,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
       title="Best vs. baseline"
       topic="difference"
       tone={toneOf(verdict)}
-      value={VERDICTS[verdict]}
+      value={VERDICTS[verdict].word}
       remark={confidence !== null && `${confidenceText(confidence)} confidence`}
     >
       <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}

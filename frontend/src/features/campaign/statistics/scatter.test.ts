@@ -1,9 +1,9 @@
 import { expect, test } from "vitest";
 import type { CampaignStatistics } from "../../../api/types";
-import { scatterMeaning } from "./scatter";
+import { isPriorScatter } from "./scatter";
 
 test("a scatter without a repeated gain set is named as the prior's", () => {
   const group = (...errors: number[]) => ({ errors }) as unknown as CampaignStatistics["groups"][number];
-  expect(scatterMeaning({ sigma: 0.01, groups: [group(0.3), group(0.1)] })).toContain("prior");
-  expect(scatterMeaning({ sigma: 0.01, groups: [group(0.3, 0.31), group(0.1)] })).not.toContain("prior");
+  expect(isPriorScatter({ sigma: 0.01, groups: [group(0.3), group(0.1)] })).toBe(true);
+  expect(isPriorScatter({ sigma: 0.01, groups: [group(0.3, 0.31), group(0.1)] })).toBe(false);
 });

@@ -6,8 +6,3 @@ import type { CampaignStatistics } from "../../../api/types";
 export function isPriorScatter({ sigma, groups }: Pick<CampaignStatistics, "sigma" | "groups">): boolean {
   return sigma !== null && sigma > 0 && groups.every(({ errors }) => errors.length < 2);
 }
-
-/** What the ± of a single flight's error is. */
-export function scatterMeaning(statistics: Pick<CampaignStatistics, "sigma" | "groups">): string {
-  return isPriorScatter(statistics) ? "± prior estimate of the scatter" : "± flight-to-flight scatter";
-}

@@ -31,7 +31,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
     return (
       <Button
         variant="default"
-        className={page["wrapping"] ?? ""}
+        className={page["wrapping"]}
         leftSection={<IconShieldCheck size={20} aria-hidden />}
         onClick={() => setAsking(true)}
       >

@@ -1,5 +1,5 @@
 import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
-import { IconCircleArrowDown, IconCircleArrowUp, IconDownload, IconHelpHexagon, IconRepeat } from "@tabler/icons-react";
+import { IconDownload, IconRepeat } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useCreateTrial } from "../../../api/mutations";
 import { recordCsv, useCampaign, useStatistics } from "../../../api/queries";
@@ -25,7 +25,7 @@ import { standingWithout } from "../flights/review";
 import { comparisonAddress } from "../flights/useSelectedFlights";
 import { scrollUpOnceBegun } from "../next-flight/nextStep";
 import { useSpeed } from "../next-flight/speed";
-import { scatterMeaning } from "../statistics/scatter";
+import { isPriorScatter } from "../statistics/scatter";
 import { PromoteGains } from "./PromoteGains";
 import classes from "./VerdictPanel.module.css";
 import { bestBeforeOf, bestBeforeTitle, comparedWith, isScored, repeatPurpose, sentenceOf, VERDICTS } from "./verdict";
@@ -98,7 +98,11 @@ export function VerdictPanel({ trial, trials, pin }: Props) {
           value={
             <>
               {plusMinus(trial.error, scatter, unit)}{" "}
-              {statistics && scatter ? <small>({scatterMeaning(statistics)})</small> : null}
+              {statistics && scatter ? (
+                <small>
+                  (± {isPriorScatter(statistics) ? "prior estimate of the scatter" : "flight-to-flight scatter"})
+                </small>
+              ) : null}
             </>
           }
         />
@@ -187,13 +191,6 @@ export function VerdictPanel({ trial, trials, pin }: Props) {
   );
 }
 
-const SIGNS = {
-  better: { Icon: IconCircleArrowDown, color: "var(--best)" },
-  worse: { Icon: IconCircleArrowUp, color: "var(--bad)" },
-  unresolved: { Icon: IconHelpHexagon, color: "var(--dim)" },
-  "not known yet": { Icon: IconHelpHexagon, color: "var(--dim)" },
-} as const;
-
 /** Verdicts of the flight's gains against the best before it and against the first. */
 function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; unit: string }) {
   if (trial.comparisons.length === 0) return null;
@@ -201,13 +198,13 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
   return (
     <Stack component="ul" gap={4} mt={8} fz="body" lh={1.4} className="numbers">
       {trial.comparisons.map(({ against, trial_number, verdict, confidence, difference, standard_error }) => {
-        const { Icon, color } = SIGNS[verdict];
+        const { word, Icon, color } = VERDICTS[verdict];
         return (
           <Group key={against} component="li" gap={8} wrap="nowrap" align="start">
             <Icon size={20} color={asked ? "var(--dim)" : color} aria-hidden />
             <span>
-              {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>} vs.
-              flight {trial_number} ({against === "first" ? "first" : best})
+              {asked ? `These gains: ${verdict}` : <strong>{word}</strong>} vs. flight {trial_number} (
+              {against === "first" ? "first" : best})
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}
               {difference < 0 ? "lower" : "higher"}{" "}
@@ -229,7 +226,7 @@ const KINDS = {
 
 /** Glitches of the record, and the error without them. The stored record is unchanged. */
 function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
-  const glitches = trial.glitches ?? [];
+  const { glitches } = trial;
   if (glitches.length === 0) return null;
   return (
     <Aside tone="bad" mb={14} fz="small">
@@ -247,7 +244,7 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
           </li>
         ))}
       </ul>
-      {trial.repaired_error !== null && trial.repaired_error !== undefined && (
+      {trial.repaired_error !== null && (
         <p className="numbers">
           Error as recorded <span className="quantity">{plusMinus(trial.error, null, unit)}</span>, with the glitches
           interpolated <span className="quantity">{plusMinus(trial.repaired_error, null, unit)}</span>.

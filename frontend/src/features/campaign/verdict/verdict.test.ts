@@ -12,7 +12,7 @@ import {
 } from "./verdict";
 
 const trial = (number: number, state: Trial["state"], error: number | null) =>
-  ({ id: number, number, state, error }) as unknown as Trial;
+  ({ id: number, number, state, error, glitches: [] }) as unknown as Trial;
 
 const first = trial(1, "valid", 0.3267);
 const glitch = trial(2, "invalid", 0.05);

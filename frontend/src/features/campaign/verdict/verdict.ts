@@ -1,13 +1,15 @@
 /** Texts and decisions about the result of a flight. */
 
+import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import type { Campaign, Trial } from "../../../api/types";
 import { wasFlown } from "../../../ui/states";
 
+/** Word and sign of a verdict. */
 export const VERDICTS = {
-  better: "Better",
-  worse: "Worse",
-  unresolved: "Unresolved",
-  "not known yet": "Not known yet",
+  better: { word: "Better", Icon: IconCircleArrowDown, color: "var(--best)" },
+  worse: { word: "Worse", Icon: IconCircleArrowUp, color: "var(--bad)" },
+  unresolved: { word: "Unresolved", Icon: IconHelpHexagon, color: "var(--dim)" },
+  "not known yet": { word: "Not known yet", Icon: IconHelpHexagon, color: "var(--dim)" },
 } as const;
 
 /** Position of the error relative to its predicted interval; null if one is missing. */
@@ -35,7 +37,7 @@ export function repeatPurpose(trial: Trial): string {
 
 /** Markers of a flight besides its class. */
 export function marksOf(trial: Trial): string[] {
-  const glitches = trial.glitches?.length ?? 0;
+  const glitches = trial.glitches.length;
   return [
     trial.overrule_reason ? "Gate overruled" : "",
     glitches > 0 ? `${glitches} glitch${glitches === 1 ? "" : "es"}` : "",

@@ -1,18 +1,17 @@
-import { type InfiniteData, InfiniteQueryObserver, QueryClient } from "@tanstack/react-query";
+import { InfiniteQueryObserver, QueryClient } from "@tanstack/react-query";
 import { expect, test } from "vitest";
-import { addPage } from "./paging";
-
-type Numbers = InfiniteData<number, number>;
+import { addPage } from "./ShowMore";
 
 /** A list of five pages, and what lets the requests that wait be answered. */
 function listOfPages() {
   const waiting: (() => void)[] = [];
   const client = new QueryClient();
-  const list = new InfiniteQueryObserver<number, Error, Numbers, string[], number>(client, {
+  const list = new InfiniteQueryObserver(client, {
     queryKey: ["numbers"],
     queryFn: ({ pageParam }) => new Promise<number>((resolve) => waiting.push(() => resolve(pageParam))),
     initialPageParam: 1,
-    getNextPageParam: (last) => (last < 5 ? last + 1 : null),
+    getNextPageParam: (last: number) => (last < 5 ? last + 1 : null),
+    select: ({ pages }) => ({ items: pages, total: 5 }),
   });
   list.subscribe(() => {});
   return {
@@ -22,7 +21,7 @@ function listOfPages() {
       await expect.poll(() => waiting.length).toBeGreaterThan(0);
       waiting.shift()?.();
     },
-    pages: () => list.getCurrentResult().data?.pages,
+    pages: () => list.getCurrentResult().data?.items,
   };
 }
 
