@@ -1,7 +1,7 @@
 /** All mutations. The event stream invalidates queries; responses are stored in the cache immediately. */
 
 import { type MutationFunctionContext, useMutation, useQueryClient } from "@tanstack/react-query";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { answer } from "./client";
 import {
   archiveCampaign,
@@ -67,12 +67,11 @@ export function useCreateCampaign() {
 /** Plan a trial of a proposal or of manual gains, and fly it if the body requests it; otherwise open the fly screen of
  * a registered vehicle. Navigates here because the calling card is unmounted as soon as the trial is known. */
 export function useCreateTrial({ id, vehicle }: Campaign) {
-  const navigate = useNavigate();
   return useMutation({
     mutationFn: (body: NewTrial) =>
       answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
     onSuccess: (trial, sent, before, context) => {
-      if (vehicle.registered && !sent.fly) void navigate(`/fly/${trial.id}`);
+      if (vehicle.registered && !sent.fly) navigate(`/fly/${trial.id}`);
       return keepTrial(trial, sent, before, context);
     },
     onError: useStaleCampaigns(),

@@ -1,7 +1,7 @@
 import { Group, SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
 import { flushSync } from "react-dom";
-import { useParams } from "react-router";
+import { useParams } from "wouter";
 import { useReadOnlyReason } from "../../api/access";
 import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";

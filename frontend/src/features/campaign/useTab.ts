@@ -1,4 +1,4 @@
-import { useSearchParams } from "react-router";
+import { useSearchParams } from "wouter";
 
 const TABS = ["trends", "flights", "statistics"] as const;
 
@@ -8,6 +8,6 @@ export function useTab(): [string, (tab: string | null) => void] {
   const [params, setParams] = useSearchParams();
   const tab = TABS.find((one) => one === params.get("tab")) ?? TABS[0];
   const open = (value: string | null): void =>
-    setParams(value === null || value === TABS[0] ? {} : { tab: value }, { replace: true, preventScrollReset: true });
+    setParams(value === null || value === TABS[0] ? {} : { tab: value }, { replace: true });
   return [tab, open];
 }

@@ -2,7 +2,7 @@ import { Box, Button, Group, Stack, Text, Title, useComputedColorScheme } from "
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
-import { useSearchParams } from "react-router";
+import { useSearchParams } from "wouter";
 import {
   comparisonFigure,
   curvesCsv,
