@@ -1,5 +1,5 @@
 import { type ComponentType, lazy, useEffect } from "react";
-import { Navigate, Route, Routes } from "react-router";
+import { Redirect, Route, Switch } from "wouter";
 import { ApiError, PAGE_MISSING } from "./api/problems";
 import { loadPlotly } from "./charts/plotly";
 import { CampaignPage } from "./features/campaign/CampaignPage";
@@ -24,26 +24,28 @@ const VehiclesPage = lazyPage("VehiclesPage");
 export function App() {
   useEffect(fetchEveryPage, []);
   return (
-    <Routes>
-      <Route element={<AppFrame />}>
-        <Route index element={<CampaignListPage />} />
-        <Route path="new" element={<NewCampaignPage />} />
-        <Route path="campaigns/:campaignId" element={<CampaignPage />} />
-        <Route path="campaigns/:campaignId/flights/:trialId" element={<FlightPage />} />
-        <Route path="compare" element={<ComparePage />} />
-        <Route path="fly/:trialId" element={<FlyPage />} />
-        <Route path="vehicles" element={<VehiclesPage />} />
-        <Route path="vehicles/new" element={<NewVehiclePage />} />
-        <Route path="vehicles/:vehicleId" element={<VehiclePage />} />
-        <Route path="vehicles/:vehicleId/edit" element={<EditVehiclePage />} />
-        <Route path="reproductions" element={<ReproductionsPage />} />
-        <Route path="controller/*" element={<Navigate to="/log-analysis" replace />} />
-        <Route path="log-analysis" element={<LogAnalysisPage />} />
-        <Route path="jobs" element={<JobsPage />} />
-        <Route path="settings" element={<SettingsPage />} />
-        <Route path="*" element={<NotFoundPage />} />
-      </Route>
-    </Routes>
+    <AppFrame>
+      <Switch>
+        <Route path="/" component={CampaignListPage} />
+        <Route path="/new" component={NewCampaignPage} />
+        <Route path="/campaigns/:campaignId" component={CampaignPage} />
+        <Route path="/campaigns/:campaignId/flights/:trialId" component={FlightPage} />
+        <Route path="/compare" component={ComparePage} />
+        <Route path="/fly/:trialId" component={FlyPage} />
+        <Route path="/vehicles" component={VehiclesPage} />
+        <Route path="/vehicles/new" component={NewVehiclePage} />
+        <Route path="/vehicles/:vehicleId" component={VehiclePage} />
+        <Route path="/vehicles/:vehicleId/edit" component={EditVehiclePage} />
+        <Route path="/reproductions" component={ReproductionsPage} />
+        <Route path="/log-analysis" component={LogAnalysisPage} />
+        <Route path="/jobs" component={JobsPage} />
+        <Route path="/settings" component={SettingsPage} />
+        <Route path="/controller/*?">
+          <Redirect to="/log-analysis" replace />
+        </Route>
+        <Route component={NotFoundPage} />
+      </Switch>
+    </AppFrame>
   );
 }
 

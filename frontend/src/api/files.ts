@@ -1,7 +1,7 @@
 /** Files that the server creates or imports: reports, bundles, backups. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { randomKey } from "./client";
 import { ApiError, problemFrom } from "./problems";
 import type { Campaign } from "./types";
@@ -35,7 +35,6 @@ export function useDownload(path: string) {
  * empty list is replaced as soon as the campaign is known. */
 export function useImportBundle() {
   const queries = useQueryClient();
-  const navigate = useNavigate();
   return useMutation({
     mutationFn: async (file: File) => {
       const body = new FormData();
@@ -44,7 +43,7 @@ export function useImportBundle() {
       return (await (await asked("/api/bundles", { method: "POST", body, headers })).json()) as Campaign;
     },
     onSuccess: ({ id }) => {
-      void navigate(`/campaigns/${id}`);
+      navigate(`/campaigns/${id}`);
       return queries.invalidateQueries({ queryKey: ["campaigns"] });
     },
   });

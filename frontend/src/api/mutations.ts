@@ -1,7 +1,7 @@
 /** All mutations. The event stream invalidates queries; responses are stored in the cache immediately. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { answer } from "./client";
 import {
   type AbortJudgement,
@@ -75,10 +75,9 @@ export function useCreateCampaign() {
 /** Plan a trial of a proposal or of manual gains, and fly it if the body requests it; otherwise open the fly screen of
  * a registered vehicle. Navigates here because the calling card is unmounted as soon as the trial is known. */
 export function useCreateTrial({ id, vehicle }: Campaign) {
-  const navigate = useNavigate();
   return useTrialRequest(
     (body: NewTrial) => answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
-    (trial, { fly }) => vehicle.registered && !fly && void navigate(`/fly/${trial.id}`),
+    (trial, { fly }) => vehicle.registered && !fly && navigate(`/fly/${trial.id}`),
   );
 }
 

@@ -1,13 +1,13 @@
 import { Box, Stack } from "@mantine/core";
 import { useWindowEvent } from "@mantine/hooks";
 import { useQueryClient } from "@tanstack/react-query";
-import { Suspense, useEffect, useEffectEvent, useLayoutEffect, useRef } from "react";
-import { Link, Outlet, useLocation, useMatch, useNavigationType, useSearchParams } from "react-router";
+import { type ReactNode, Suspense, useEffect, useEffectEvent, useLayoutEffect, useRef } from "react";
+import { Link, useLocation, useRoute, useSearchParams } from "wouter";
 import { useReadOnlyReason, useUnlocked } from "../api/access";
 import { useRenewedControl } from "../api/control";
 import { useCampaign } from "../api/queries";
 import { useVehicle } from "../api/vehicles";
-import { useAbort, useFlying } from "../live/flights";
+import { AbortContext, useAbort, useFlying } from "../live/flights";
 import { followEvents, liveFlightsNow, useConnection } from "../live/store";
 import { VehicleBadge } from "../ui/Badges";
 import { ReadOnlyNotice, UnlockedNotice } from "../ui/Notices";
@@ -58,23 +58,27 @@ function CampaignVehicle({ campaignId }: { campaignId: number }) {
 
 /** A page that a link opens begins at its top; going back leaves the place to the browser. */
 function usePagesOpenAtTop(): void {
-  const { pathname, hash } = useLocation();
-  const type = useNavigationType();
+  const [pathname] = useLocation();
   const shown = useRef(pathname);
+  const wentBack = useRef(false);
+  useWindowEvent("popstate", () => {
+    wentBack.current = true;
+  });
   useLayoutEffect(() => {
     if (pathname === shown.current) return;
     shown.current = pathname;
-    if (type === "PUSH" && hash === "") window.scrollTo(0, 0);
-  }, [pathname, hash, type]);
+    if (!wentBack.current && window.location.hash === "") window.scrollTo(0, 0);
+    wentBack.current = false;
+  }, [pathname]);
 }
 
-export function AppFrame() {
-  const onPage = useMatch("/campaigns/:campaignId/*");
-  const campaignId = onPage ? Number(onPage.params.campaignId) : null;
+export function AppFrame({ children }: { children: ReactNode }) {
+  const [isOnPage, params] = useRoute("/campaigns/:campaignId/*?");
+  const campaignId = isOnPage ? Number(params.campaignId) : null;
   const flying = useFlying();
   const abort = useAbort(flying);
-  const { pathname } = useLocation();
-  const onFlyScreen = useMatch("/fly/:trialId") !== null;
+  const [pathname] = useLocation();
+  const onFlyScreen = useRoute("/fly/:trialId")[0];
   const isInFlight = flying.length > 0;
   useEventStream(isInFlight);
   useRenewedControl();
@@ -128,7 +132,7 @@ export function AppFrame() {
         <UnlockedNotice what={parameters.has("unlocked") ? unlocked : null} />
         <PageGuard path={pathname}>
           <Suspense fallback={<div aria-busy="true" />}>
-            <Outlet context={abort} />
+            <AbortContext value={abort}>{children}</AbortContext>
           </Suspense>
         </PageGuard>
       </main>

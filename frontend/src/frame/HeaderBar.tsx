@@ -1,6 +1,6 @@
 import { ActionIcon, Box, Text, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
 import { IconMoon, IconPlugConnected, IconPlugConnectedX, IconRefresh, IconSun } from "@tabler/icons-react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
 import {
   type Connection,

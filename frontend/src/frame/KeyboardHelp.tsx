@@ -1,7 +1,7 @@
 import { ActionIcon, Title } from "@mantine/core";
 import { IconKeyboard } from "@tabler/icons-react";
 import { Fragment, useRef } from "react";
-import { useLocation } from "react-router";
+import { useLocation } from "wouter";
 import { Note } from "../ui/Note";
 import classes from "./KeyboardHelp.module.css";
 import { keysOf } from "./keys";
@@ -9,7 +9,7 @@ import { useKeys } from "./useKeys";
 
 /** Keyboard shortcuts of this page, opened by a button or `?`. Non-modal, and it does not cover the abort button. */
 export function KeyboardHelp() {
-  const { pathname } = useLocation();
+  const [pathname] = useLocation();
   const dialog = useRef<HTMLDialogElement>(null);
   useKeys({
     help: () => dialog.current?.togglePopover(),

@@ -1,7 +1,7 @@
 import { Box, Group, UnstyledButton } from "@mantine/core";
 import { IconChevronDown, IconMenu2 } from "@tabler/icons-react";
 import { useRef } from "react";
-import { NavLink, useLocation } from "react-router";
+import { Link, useLocation } from "wouter";
 import classes from "./MainNav.module.css";
 
 /** Pages with `inRow` are in the row on wide screens. The menu has all pages on small screens, else the rest. */
@@ -22,17 +22,18 @@ interface PageLinkProps {
 }
 
 function PageLink({ to, title, onClick }: PageLinkProps) {
+  const isHere = useLocation()[0] === to;
   return (
-    <NavLink to={to} end className={classes["link"] ?? ""} onClick={onClick}>
+    <Link to={to} className={classes["link"]} aria-current={isHere ? "page" : undefined} onClick={onClick}>
       {title}
-    </NavLink>
+    </Link>
   );
 }
 
 /** Main navigation: the main pages in a row, the rest in a menu; all in the menu on small screens, in flight also on
  * larger ones. A phone has no room for it in flight. */
 export function MainNav({ isInFlight }: { isInFlight: boolean }) {
-  const { pathname } = useLocation();
+  const [pathname] = useLocation();
   const menu = useRef<HTMLUListElement>(null);
   const inMenu = PAGES.some(({ to, inRow }) => to === pathname && !inRow);
   const rowFrom = isInFlight ? "lg" : "sm";

@@ -1,7 +1,7 @@
 import { Text } from "@mantine/core";
 import { IconAlertTriangle, IconAntennaBars5, IconAntennaBarsOff, IconBattery3, IconUser } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { Link, useMatch } from "react-router";
+import { Link, useRoute } from "wouter";
 import { useOwnLease } from "../api/leases";
 import { useCampaign, useTrial } from "../api/queries";
 import type { Vehicle } from "../api/types";
@@ -30,7 +30,7 @@ export function VehicleStrip() {
 
 /** The vehicle of the fly screen that is open; null on other pages, and until it is known. */
 function useFlownVehicle(): number | null {
-  const trialId = Number(useMatch("/fly/:trialId")?.params.trialId);
+  const trialId = Number(useRoute("/fly/:trialId")[1]?.trialId);
   const trial = useTrial(Number.isInteger(trialId) ? trialId : null).data;
   return useCampaign(trial?.campaign_id ?? null).data?.vehicle.id ?? null;
 }

@@ -1,7 +1,7 @@
 /** Flights in progress, and their abort. */
 
 import { useQuery } from "@tanstack/react-query";
-import { useCallback, useEffect, useRef, useState } from "react";
+import { createContext, use, useCallback, useEffect, useRef, useState } from "react";
 import { answer } from "../api/client";
 import { abortTrial, getCampaign, listCampaigns } from "../api/generated";
 import { leasesNow, type OwnLease } from "../api/leases";
@@ -126,6 +126,15 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
 }
 
 export type AbortControl = ReturnType<typeof useAbort>;
+
+/** The abort of the flights in progress, for the pages in the frame. */
+export const AbortContext = createContext<AbortControl | null>(null);
+
+export function useAbortControl(): AbortControl {
+  const abort = use(AbortContext);
+  if (abort === null) throw new Error("a page outside the frame");
+  return abort;
+}
 
 /**
  * How far an abort has come. not confirmed: it was refused, or perhaps not received, and is repeated. landing, link

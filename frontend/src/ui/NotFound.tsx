@@ -1,5 +1,5 @@
 import { Anchor } from "@mantine/core";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { ErrorNotice } from "./Notices";
 import { useTitle } from "./useTitle";
 

@@ -1,6 +1,6 @@
 import { Group, Stack, Text } from "@mantine/core";
 import { useState } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import type { CampaignSummary } from "../../api/types";
 import { Sparkline } from "../../charts/Sparkline";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";

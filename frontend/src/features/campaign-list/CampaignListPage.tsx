@@ -2,7 +2,7 @@ import { Button, Group, SegmentedControl, SimpleGrid, Skeleton, TextInput, Title
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useCampaigns, useCatalogue } from "../../api/queries";
 import type { Sort } from "../../api/types";
 import { SelectField } from "../../ui/Fields";

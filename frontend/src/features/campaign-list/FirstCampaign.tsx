@@ -1,6 +1,7 @@
 import { Anchor, Box, Button, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
-import { Link, useNavigate } from "react-router";
+import { Link } from "wouter";
+import { navigate } from "wouter/use-browser-location";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import { Note } from "../../ui/Note";
@@ -21,7 +22,6 @@ const STEPS = [
 
 /** Empty list: explains campaigns, and creates the first one with one click. */
 export function FirstCampaign() {
-  const navigate = useNavigate();
   const catalogue = useCatalogue();
   const create = useCreateCampaign();
   const preset = catalogue.data && firstPreset(catalogue.data);
@@ -56,7 +56,7 @@ export function FirstCampaign() {
         disabled={preset === undefined}
         leftSection={<IconPlus size={22} aria-hidden />}
         onClick={() =>
-          preset && create.mutate(preset.campaign, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })
+          preset && create.mutate(preset.campaign, { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) })
         }
       >
         Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”

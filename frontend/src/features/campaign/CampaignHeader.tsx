@@ -1,7 +1,7 @@
 import { ActionIcon, Anchor, Box, Button, Group, SimpleGrid, Text, TextInput, Title } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
 import { useState } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { pathOf, useDownload } from "../../api/files";
 import { useRename } from "../../api/mutations";
 import { problemOf } from "../../api/problems";

@@ -1,7 +1,7 @@
 import { Group, SimpleGrid, Skeleton, Tabs } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
 import { flushSync } from "react-dom";
-import { useParams, useSearchParams } from "react-router";
+import { useParams, useSearchParams } from "wouter";
 import { useReadOnlyReason } from "../../api/access";
 import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";
@@ -68,7 +68,7 @@ function useTab(): [string, (tab: string | null) => void] {
   const [params, setParams] = useSearchParams();
   const tab = TABS.find((one) => one === params.get("tab")) ?? TABS[0];
   const open = (value: string | null): void =>
-    setParams(value === null || value === TABS[0] ? {} : { tab: value }, { replace: true, preventScrollReset: true });
+    setParams(value === null || value === TABS[0] ? {} : { tab: value }, { replace: true });
   return [tab, open];
 }
 

@@ -2,7 +2,7 @@
 
 import { Button, Group, Stack } from "@mantine/core";
 import { useState } from "react";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { useArchive, useDeleteCampaign, useFinish } from "../../api/mutations";
 import type { Campaign } from "../../api/types";
 import { Note } from "../../ui/Note";
@@ -68,13 +68,12 @@ export function ArchiveCampaign({ campaignId }: { campaignId: number }) {
 
 /** Deletes a campaign that has not flown. */
 export function DeleteCampaign({ campaign }: { campaign: Campaign }) {
-  const navigate = useNavigate();
   return (
     <Question
       act="Delete campaign"
       question="Delete this campaign? It has not flown, and nothing of it is kept."
       otherwise="Cancel"
-      mutation={useDeleteCampaign(campaign, () => void navigate("/"))}
+      mutation={useDeleteCampaign(campaign, () => navigate("/"))}
     />
   );
 }

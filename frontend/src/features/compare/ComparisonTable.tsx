@@ -1,7 +1,7 @@
 import { ActionIcon, Anchor, Group, Text } from "@mantine/core";
 import { IconArrowBarToUp, IconX } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "../../api/compare";
 import type { FigureCard } from "../../api/types";
 import type { PlotlyFigure } from "../../charts/traces";

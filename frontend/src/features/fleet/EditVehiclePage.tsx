@@ -1,7 +1,8 @@
 import { Button, Group } from "@mantine/core";
 import { useForm } from "@mantine/form";
 import { useState } from "react";
-import { Link, Navigate, useNavigate, useParams } from "react-router";
+import { Link, Redirect, useParams } from "wouter";
+import { navigate } from "wouter/use-browser-location";
 import { useReadOnlyReason } from "../../api/access";
 import { useDeleteVehicle, useEditVehicle } from "../../api/fleet";
 import { useCatalogue } from "../../api/queries";
@@ -20,8 +21,8 @@ export function EditVehiclePage() {
   const catalogue = useCatalogue();
   const vehicle = vehicles.data?.find(({ id }) => id === vehicleId);
   useTitle("Edit vehicle");
-  if (vehicles.data && !vehicle) return <Navigate to="/vehicles" replace />;
-  if (vehicle && !vehicle.actions.includes("configure")) return <Navigate to={`/vehicles/${vehicleId}`} replace />;
+  if (vehicles.data && !vehicle) return <Redirect to="/vehicles" replace />;
+  if (vehicle && !vehicle.actions.includes("configure")) return <Redirect to={`/vehicles/${vehicleId}`} replace />;
   return (
     <FormPage
       title={`Edit ${vehicle?.name ?? "vehicle"}`}
@@ -39,14 +40,13 @@ function EditForm({ vehicle, catalogue }: { vehicle: Vehicle; catalogue: Catalog
     initialValues: { version, name, options },
     transformValues: (values): VehicleEdit => ({ ...values, name: values.name.trim() }),
   });
-  const navigate = useNavigate();
   const edit = useEditVehicle(vehicle.id);
   return (
     <RequestForm
       form={form}
       labels={{ ...PLAIN_LABELS, ...furtherLabels(catalogue) }}
       request={edit}
-      onDone={() => void navigate(`/vehicles/${vehicle.id}`)}
+      onDone={() => navigate(`/vehicles/${vehicle.id}`)}
       actions={
         <Group>
           <DeleteVehicle vehicle={vehicle} />
@@ -72,9 +72,8 @@ function EditForm({ vehicle, catalogue }: { vehicle: Vehicle; catalogue: Catalog
 }
 
 function DeleteVehicle({ vehicle }: { vehicle: Vehicle }) {
-  const navigate = useNavigate();
   const [isAsked, setAsked] = useState(false);
-  const remove = useDeleteVehicle(vehicle, () => void navigate("/vehicles"));
+  const remove = useDeleteVehicle(vehicle, () => navigate("/vehicles"));
   return (
     <>
       {isAsked ? (

@@ -1,6 +1,6 @@
 import { Anchor, Button, Group, Stack, Text, TextInput } from "@mantine/core";
 import { type ReactNode, useState } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useActs, useEditVehicle } from "../../api/fleet";
 import { useCatalogue } from "../../api/queries";
 import type { Vehicle } from "../../api/types";

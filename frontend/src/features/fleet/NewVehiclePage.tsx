@@ -1,7 +1,7 @@
 import { Button, Checkbox, SimpleGrid, Stack, TextInput } from "@mantine/core";
 import { useForm } from "@mantine/form";
 import { IconPlus } from "@tabler/icons-react";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { useRegistrationRefusal } from "../../api/access";
 import { useRegisterVehicle } from "../../api/fleet";
 import { useCatalogue } from "../../api/queries";
@@ -43,7 +43,6 @@ const LABELS = {
 
 function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
   const form = useForm({ initialValues: startingVehicle(catalogue), transformValues: vehicleRequest });
-  const navigate = useNavigate();
   const register = useRegisterVehicle();
   const { options } = form.values;
   const autopilot = autopilotOf(form.values);
@@ -59,7 +58,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         ...furtherLabels(catalogue),
       }}
       request={register}
-      onDone={({ id }) => void navigate(`/vehicles/${id}`)}
+      onDone={({ id }) => navigate(`/vehicles/${id}`)}
       actions={
         <>
           <MissingEntries numbers={unread} />

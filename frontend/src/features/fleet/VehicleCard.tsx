@@ -1,6 +1,6 @@
 import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
 import { IconPlugConnected } from "@tabler/icons-react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useVehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";

@@ -1,6 +1,6 @@
 import { Anchor, Skeleton, Stack } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useActs, useLedger } from "../../api/fleet";
 import type { FigureCard, GivenGains, Vehicle } from "../../api/types";
 import { useCalibration, useVehicleFigure } from "../../api/vehicles";

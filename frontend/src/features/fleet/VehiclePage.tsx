@@ -1,7 +1,7 @@
 import { Anchor, Button, Group, SimpleGrid, Skeleton, Stack, Title } from "@mantine/core";
 import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { Link, useParams } from "react-router";
+import { Link, useParams } from "wouter";
 import { useReadOnlyReason } from "../../api/access";
 import { useVehicleRequest, type VehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";

@@ -1,7 +1,7 @@
 import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Fragment } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useCatalogue } from "../../api/queries";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";

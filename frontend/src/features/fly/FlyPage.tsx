@@ -1,7 +1,7 @@
 import { Anchor, Group, Skeleton, Stack, Text, Title } from "@mantine/core";
 import { IconAlertOctagonFilled, IconChevronLeft } from "@tabler/icons-react";
 import { useMemo, useRef, useState } from "react";
-import { Link, useOutletContext, useParams } from "react-router";
+import { Link, useParams } from "wouter";
 import { useReadOnlyReason } from "../../api/access";
 import { type TimeRange, useCampaign, useCampaignFigure, useCatalogue, useTrial } from "../../api/queries";
 import type { Campaign, Trial, Vehicle } from "../../api/types";
@@ -9,7 +9,7 @@ import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
 import { Chart } from "../../charts/Chart";
 import { type PlotlyFigure, wholeFlight, withChosen, withLimit, withTimeRange } from "../../charts/traces";
-import { type AbortControl, abortStage, isCutShort } from "../../live/flights";
+import { abortStage, isCutShort, useAbortControl } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
 import { hasLanded, type LiveFlight, readingOf } from "../../live/telemetry";
@@ -58,7 +58,7 @@ const BARRED: readonly FlyStep[] = ["plan", "staging", "staged", "unstaging"];
 
 /** All readings and actions to stage, fly and review a flight. */
 function Screen({ campaign, trial, vehicle }: Props) {
-  const abort = useOutletContext<AbortControl>();
+  const abort = useAbortControl();
   const live = useLiveFlight(trial.id);
   const status = useVehicleStatus(vehicle?.id ?? null);
   const orders = useVehicleCommands(vehicle?.id ?? 0);

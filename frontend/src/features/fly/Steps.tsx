@@ -1,7 +1,7 @@
 import { Anchor, Button, Group, Loader, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useReadOnlyReason } from "../../api/access";
 import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";

@@ -1,6 +1,6 @@
 import { Anchor, Box, Button, Text } from "@mantine/core";
 import { type ReactNode, useState } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { type Job, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
 import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";

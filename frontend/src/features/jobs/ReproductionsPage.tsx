@@ -1,7 +1,6 @@
 import { Button, Group, SimpleGrid, Skeleton, Title } from "@mantine/core";
 import { IconPlayerPlay } from "@tabler/icons-react";
 import { useEffect } from "react";
-import { useLocation } from "react-router";
 import { useReproductions, useRunReproduction } from "../../api/jobs";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
@@ -49,8 +48,8 @@ export function ReproductionsPage() {
 
 /** Scroll to the URL's fragment once the list is loaded. */
 function useScrollToHash(ready: boolean): void {
-  const { hash } = useLocation();
   useEffect(() => {
+    const { hash } = window.location;
     if (ready && hash !== "") document.getElementById(hash.slice(1))?.scrollIntoView();
-  }, [ready, hash]);
+  }, [ready]);
 }

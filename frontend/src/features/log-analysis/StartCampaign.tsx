@@ -1,6 +1,6 @@
 import { Button } from "@mantine/core";
 import { useState } from "react";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { useStartCampaign } from "../../api/logAnalyses";
 import type { RecordFiles } from "../../api/records";
 import { useVehicles } from "../../api/vehicles";
@@ -10,7 +10,6 @@ import { ErrorNotice } from "../../ui/Notices";
 /** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
 export function StartCampaign({ files, experiment }: { files: RecordFiles; experiment: string | null }) {
   const { mutate, error, isPending } = useStartCampaign();
-  const navigate = useNavigate();
   const [chosen, setChosen] = useState("");
   const flying = (useVehicles().data ?? []).filter(
     ({ registered, experiments }) => registered && experiments.includes(experiment ?? ""),
@@ -35,7 +34,7 @@ export function StartCampaign({ files, experiment }: { files: RecordFiles; exper
         onClick={() =>
           mutate(
             { files, vehicle: chosen === "" ? null : Number(chosen) },
-            { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
+            { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) },
           )
         }
       >

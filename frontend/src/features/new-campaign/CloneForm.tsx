@@ -1,7 +1,7 @@
 import { Button, Group, Stack, Switch } from "@mantine/core";
 import { IconCopy } from "@tabler/icons-react";
 import { useState } from "react";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { useClone } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
@@ -19,7 +19,6 @@ interface Props extends Pick<Campaign, "id" | "vehicle"> {
 
 /** Clone with the same settings, on this vehicle or another, from the start gains or this campaign's best. */
 export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: Props) {
-  const navigate = useNavigate();
   const ownKey = own.registered ? String(own.id) : own.kind;
   const [vehicle, setVehicle] = useState(ownKey);
   const [warm, setWarm] = useState(false);

@@ -1,7 +1,8 @@
 import { Button, SimpleGrid, TextInput } from "@mantine/core";
 import { useForm } from "@mantine/form";
 import { IconPlus } from "@tabler/icons-react";
-import { useNavigate, useSearchParams } from "react-router";
+import { useSearchParams } from "wouter";
+import { navigate } from "wouter/use-browser-location";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue, NewCampaign, Vehicle } from "../../api/types";
@@ -77,7 +78,6 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       wanted === undefined ? startingForm(catalogue) : withRegistered(startingForm(catalogue), catalogue, wanted),
     transformValues: (values) => requestFrom(values, catalogue),
   });
-  const navigate = useNavigate();
   const create = useCreateCampaign();
   const { registered, definition } = form.values;
   const { plain, advanced } = fieldsOf(form.values, catalogue);
@@ -101,7 +101,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       form={form}
       labels={{ ...plain, ...advanced }}
       request={create}
-      onDone={({ id }) => void navigate(`/campaigns/${id}`)}
+      onDone={({ id }) => navigate(`/campaigns/${id}`)}
       actions={
         <div className={classes["create"]}>
           <MissingEntries numbers={unread} texts={Object.values(missing)} />

@@ -1,6 +1,6 @@
 import { Anchor, Button, Group, Input, Radio, SimpleGrid, Text } from "@mantine/core";
 import { type ReactNode, useId } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import type { Catalogue, Vehicle } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
 import { autopilotTitle } from "../fleet/fleet";

@@ -1,7 +1,8 @@
 import { Anchor, Box, Button, Skeleton, Title } from "@mantine/core";
 import { IconPin } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
-import { Link, Navigate, useNavigate, useParams } from "react-router";
+import { Link, Redirect, useParams } from "wouter";
+import { navigate } from "wouter/use-browser-location";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../../api/queries";
 import type { FigureCard } from "../../../api/types";
 import { FigurePanel } from "../../../charts/FigurePanel";
@@ -45,13 +46,12 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
     setPin({ timeS });
     setPinning(false);
   }, []);
-  const navigate = useNavigate();
-  useFlightKeys(trials, trialId, ({ id }) => void navigate(`/campaigns/${campaignId}/flights/${id}`));
+  useFlightKeys(trials, trialId, ({ id }) => navigate(`/campaigns/${campaignId}/flights/${id}`));
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <NotFound error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
   const { campaign_id: own, number, record, gate } = trial.data;
-  if (own !== campaignId) return <Navigate replace to={`/campaigns/${own}/flights/${trialId}`} />;
+  if (own !== campaignId) return <Redirect replace to={`/campaigns/${own}/flights/${trialId}`} />;
   return (
     <>
       <Anchor component={Link} to={`/campaigns/${campaignId}`} display="inline-block" py={4} fz="small">

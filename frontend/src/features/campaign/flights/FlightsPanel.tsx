@@ -2,7 +2,7 @@ import { Anchor, Button, Checkbox, Group, Skeleton, UnstyledButton } from "@mant
 import { useLocalStorage } from "@mantine/hooks";
 import { IconStarFilled } from "@tabler/icons-react";
 import { memo, useEffect, useMemo, useRef } from "react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import type { Campaign, Trial } from "../../../api/types";
 import { onPointed, pointAt } from "../../../charts/pointing";
 import { count } from "../../../ui/format";

@@ -1,5 +1,5 @@
 import { useCallback, useState } from "react";
-import { useNavigate } from "react-router";
+import { navigate } from "wouter/use-browser-location";
 import { paramsOf } from "../../../api/compare";
 import type { Trial } from "../../../api/types";
 import { useKeys } from "../../../frame/useKeys";
@@ -14,11 +14,10 @@ export interface SelectedFlights {
 /** The flights of a campaign that are selected for comparison, and the keys that select the shown one and compare. */
 export function useSelectedFlights(campaignId: number, shown: Trial | null): SelectedFlights {
   const [selected, setSelected] = useState<readonly number[]>([]);
-  const navigate = useNavigate();
   const onSelect = useCallback((trialId: number) => setSelected((before) => toggled(before, trialId)), []);
   useKeys({
     select: () => shown !== null && wasFlown(shown.state) && onSelect(shown.id),
-    compare: () => void navigate(comparisonAddress(campaignId, selected)),
+    compare: () => navigate(comparisonAddress(campaignId, selected)),
   });
   return { selected, onSelect };
 }

@@ -1,7 +1,7 @@
 /** What cards say of a flight: its scored window, its prediction, and why it cannot fly now or did not fly last time. */
 
 import { Anchor } from "@mantine/core";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useCatalogue } from "../../../api/queries";
 import type { Definition, Trial } from "../../../api/types";
 import { useVehicle } from "../../../api/vehicles";

@@ -1,7 +1,7 @@
 import { Button, Stack } from "@mantine/core";
-import { Link, useOutletContext } from "react-router";
+import { Link } from "wouter";
 import type { Campaign, Trial } from "../../../api/types";
-import { type AbortControl, abortStage, abortText, isCutShort } from "../../../live/flights";
+import { abortStage, abortText, isCutShort, useAbortControl } from "../../../live/flights";
 import { useConnection, useIsOutputCurrent, useLiveFlight, useVehicleStatus } from "../../../live/store";
 import { isSaturated, outputNow, readingOf, throttleNow } from "../../../live/telemetry";
 import { isAfterRecord } from "../../../live/vehicleStatus";
@@ -27,7 +27,7 @@ interface Props {
 export function FlyingCard({ campaign, trials, flight }: Props) {
   const { trial_id: trialId, trial_number: number } = flight;
   const trial = trials.find(({ id }) => id === trialId);
-  const abort = useOutletContext<AbortControl>();
+  const abort = useAbortControl();
   const { state, worker } = useConnection();
   const live = useLiveFlight(trialId);
   const unit = useUnits(campaign.definition.experiment).error;

@@ -1,6 +1,6 @@
 import { Button, Stack } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../../api/mutations";
 import type { Campaign, Trial } from "../../../api/types";
 import { gainText } from "../../../ui/format";

@@ -1,5 +1,6 @@
 import { Anchor, Button, Stack } from "@mantine/core";
-import { Link, useNavigate } from "react-router";
+import { Link } from "wouter";
+import { navigate } from "wouter/use-browser-location";
 import { useRehearse } from "../../../api/mutations";
 import type { Campaign } from "../../../api/types";
 import { Aside } from "../../../ui/Aside";
@@ -11,7 +12,6 @@ import page from "../CampaignPage.module.css";
 
 /** Next action of a real vehicle's campaign that has not passed its rehearsal. */
 export function RehearsalCard({ campaign }: { campaign: Campaign }) {
-  const navigate = useNavigate();
   const rehearse = useRehearse(campaign.id);
   const hasModel = useHasModel(campaign.definition.experiment);
   const { state, campaign_id, reason } = campaign.rehearsal;
@@ -36,7 +36,7 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
           <Button
             fullWidth
             loading={rehearse.isPending}
-            onClick={() => rehearse.mutate(undefined, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })}
+            onClick={() => rehearse.mutate(undefined, { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) })}
           >
             Rehearse on a simulation
           </Button>

@@ -1,6 +1,6 @@
 import { Anchor, Button, Group, Stack, Text } from "@mantine/core";
 import { IconDownload, IconRepeat } from "@tabler/icons-react";
-import { Link } from "react-router";
+import { Link } from "wouter";
 import { useCreateTrial } from "../../../api/mutations";
 import { recordCsv, useCampaign, useStatistics } from "../../../api/queries";
 import type { Campaign, Trial } from "../../../api/types";
