@@ -30,7 +30,7 @@ class Evidence(Generic[_E_co]):
     `experiment` is the one that the definition names, as configured there; `flights` are the valid and aborted ones,
     in order, with trajectories as stored. `donor` is the flight named by `definition.start.donor`: required with start
     kind `campaign`, and not allowed with others. Up to `open_until_flight` flights no rule ends the campaign, because
-    it was reopened for them.
+    it was reopened for them. `plain` is the evidence that this one differs from by a better model and a shorter step.
     """
 
     definition: Definition
@@ -38,6 +38,7 @@ class Evidence(Generic[_E_co]):
     flights: Sequence[Flight]
     donor: Flight | None = None
     open_until_flight: int = 0
+    plain: "Evidence[Experiment] | None" = None
 
     @cached_property
     def space(self) -> PolicySpace:
@@ -62,12 +63,12 @@ class Evidence(Generic[_E_co]):
     @cached_property
     def groups(self) -> tuple[Group, ...]:
         """The valid flights by their gains."""
-        return groups_of(self.flights)
+        return groups_of(self.flights) if self.plain is None else self.plain.groups
 
     @cached_property
     def scatter(self) -> PooledScatter:
         """The scatter of the groups, with the experiment's prior."""
-        return pool_scatter(self.groups, self.experiment.scatter)
+        return pool_scatter(self.groups, self.experiment.scatter) if self.plain is None else self.plain.scatter
 
     @cached_property
     def within_bounds(self) -> Self:
@@ -78,7 +79,9 @@ class Evidence(Generic[_E_co]):
             for flight in self.flights
             if all(gain.refusal_by_bounds(flight.gains[gain.name]) is None for gain in gains)
         ]
-        return self if len(inside) == len(self.flights) else replace(self, flights=inside)
+        if len(inside) == len(self.flights):
+            return self
+        return replace(self, flights=inside, plain=None if self.plain is None else self.plain.within_bounds)
 
     @property
     def baseline(self) -> Group:

@@ -56,7 +56,7 @@ def transfer(campaign: Evidence[ModelledExperiment]) -> Transfer:
 
     def modelled(experiment: ModelledExperiment, share: float = 1.0) -> Evidence[ModelledExperiment]:
         definition = replace(campaign.definition, step_fraction=campaign.definition.step_fraction * share)
-        return replace(campaign, definition=definition, experiment=as_flown(experiment, flown))
+        return replace(campaign, definition=definition, experiment=as_flown(experiment, flown), plain=campaign)
 
     experiment = campaign.experiment
     if donor is None or not valid:
