@@ -1,4 +1,4 @@
-import { Text } from "@mantine/core";
+import { Box } from "@mantine/core";
 import type { ReactNode } from "react";
 import type { Topic } from "./explanations";
 import { HelpTip } from "./HelpTip";
@@ -11,17 +11,17 @@ interface Props {
   stale?: boolean;
 }
 
-/** One reading with its name; stale readings are grey. */
+/** One reading with its name, as large as its list makes them; stale readings are grey. */
 export function LabelledValue({ title, value, topic, bad = false, stale = false }: Props) {
   const color = bad ? "var(--bad)" : "var(--ink)";
   return (
     <div>
-      <Text component="dt" c="dimmed" fz="small">
+      <dt>
         {title} {topic && <HelpTip topic={topic} />}
-      </Text>
-      <Text component="dd" c={stale ? "dimmed" : color} fw={stale ? 550 : 650} fz="strong">
+      </dt>
+      <Box component="dd" c={stale ? "dimmed" : color} fw={stale ? 550 : undefined}>
         {value}
-      </Text>
+      </Box>
     </div>
   );
 }
