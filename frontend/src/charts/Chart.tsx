@@ -150,7 +150,7 @@ export function Chart({
     if (target === null || plotly === null) return;
     // A page that was left resizes its charts to zero, when they may already be removed.
     let here = true;
-    const fit = async () => {
+    const refit = async () => {
       await plotly.Plots.resize(target);
       await enqueue(async () => {
         // Plotly leaves the legend where it stood beside the former margins.
@@ -158,7 +158,7 @@ export function Chart({
           await plotly.update(target, {}, legendFor(drawn.current.figure, target.clientWidth), []);
       });
     };
-    const observer = new ResizeObserver(() => void (target.offsetParent !== null && fit()));
+    const observer = new ResizeObserver(() => void (target.offsetParent !== null && refit()));
     observer.observe(target);
     return () => {
       here = false;
