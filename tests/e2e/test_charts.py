@@ -8,7 +8,7 @@ from playwright.sync_api import Locator, expect
 
 from bench.seeding import seed_database
 from tests.e2e.conftest import Server
-from tests.e2e.dashboard import Dashboard, Json
+from tests.e2e.dashboard import DESK, PHONE, Dashboard, Json
 from tests.e2e.states import States
 
 FLIGHTS = 1000
@@ -88,6 +88,22 @@ def test_a_row_points_at_its_own_curves_after_flights_were_flown_on_the_open_pag
     dashboard.open_tab("Flights")
     for flight in (1, 2, 3):
         dashboard.until(partial(is_pointed_at_by_its_row, dashboard, flight))
+
+
+def test_the_legend_stays_above_the_curves_when_the_window_grows(dashboard: Dashboard, states: States) -> None:
+    """Seen: the legend of the narrow layout over the curves."""
+    dashboard.open_campaign(states.campaign(flights=1))
+    dashboard.settled()
+    for viewport in (PHONE, DESK):
+        dashboard.page.set_viewport_size(viewport)
+        dashboard.until(partial(has_its_legend_above, dashboard.plot("takeoffs")))
+
+
+def has_its_legend_above(chart: Locator) -> bool:
+    legend, curves = (chart.locator(part).first.bounding_box() for part in (".legend", ".nsewdrag"))
+    assert legend is not None
+    assert curves is not None
+    return legend["y"] + legend["height"] <= curves["y"] + 1
 
 
 def is_pointed_at_by_its_row(dashboard: Dashboard, flight: int) -> bool:

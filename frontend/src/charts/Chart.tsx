@@ -50,6 +50,11 @@ function layoutFor({ data, layout }: PlotlyFigure, width: number): Record<string
   return { ...structuredClone(fitting), autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
 }
 
+function legendFor(figure: PlotlyFigure, width: number): Record<string, unknown> {
+  const { legend } = layoutFor(figure, width);
+  return legend === undefined ? {} : { legend };
+}
+
 function wholeOf({ layout }: PlotlyFigure): TimeRange | null {
   const { xaxis } = layout as { xaxis?: { range?: TimeRange } };
   return xaxis?.range ?? null;
@@ -144,13 +149,23 @@ export function Chart({
     const target = element.current;
     if (target === null || plotly === null) return;
     // A page that was left resizes its charts to zero, when they may already be removed.
-    const observer = new ResizeObserver(() => void (target.offsetParent !== null && plotly.Plots.resize(target)));
+    let here = true;
+    const refit = async () => {
+      await plotly.Plots.resize(target);
+      await enqueue(async () => {
+        // Plotly leaves the legend where it stood beside the former margins.
+        if (here && drawn.current)
+          await plotly.update(target, {}, legendFor(drawn.current.figure, target.clientWidth), []);
+      });
+    };
+    const observer = new ResizeObserver(() => void (target.offsetParent !== null && refit()));
     observer.observe(target);
     return () => {
+      here = false;
       observer.disconnect();
       plotly.purge(target);
     };
-  }, [plotly]);
+  }, [plotly, enqueue]);
 
   return (
     <Box

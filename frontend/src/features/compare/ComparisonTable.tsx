@@ -87,7 +87,7 @@ function Act({ title, onClick, children }: { title: string; onClick: () => void;
 function Name({ flight, several, pen }: { flight: ComparedFlight; several: boolean; pen: LineStyle | undefined }) {
   const { label, number, campaign_id, trial_id, campaign_name, is_real, state, flown_at } = flight;
   return (
-    <Group gap={10} wrap="nowrap" align="start">
+    <Group gap={8} wrap="nowrap" align="start">
       {label}
       {pen && <LineSample pen={pen} />}
       <span>

@@ -83,7 +83,7 @@ function Campaign({ name, flights, open = false, ...listed }: CampaignProps) {
     >
       <summary>
         {name}
-        <Text component="small" c="dimmed" fz="fine" ml="auto" pl={6}>
+        <Text component="small" c="dimmed" fz="fine" fw={550} ml="auto" pl={6}>
           {count(flights, "flight")}
         </Text>
       </summary>
