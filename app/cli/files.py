@@ -83,7 +83,7 @@ def companion_of(file: Path) -> Path | None:
 
 
 def _read(file: Path, takeoff: int | None) -> Takeoff:
-    from app.autopilots.readers import read_takeoff  # noqa: PLC0415 - imports every reader
+    from app.autopilots.log_readers import read_takeoff  # noqa: PLC0415 - imports every reader
 
     with reading(file, "a log"), ExitStack() as files:
         stream = files.enter_context(file.open("rb"))

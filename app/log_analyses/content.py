@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeVar
 
 from app.autopilots.autopilot import Autopilot
-from app.autopilots.readers import Reader, reader_of
+from app.autopilots.log_readers import Reader, reader_of
 from app.autopilots.recording import Recording
 from app.autopilots.replica_check import LoopReplica, ReplicaCheck
 from app.autopilots.replicas import REPLICAS, traced

@@ -17,7 +17,7 @@ from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI
-from app.autopilots.readers import read_takeoff
+from app.autopilots.log_readers import read_takeoff
 from app.campaigns import landscapes, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute

@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from app.autopilots.readers import reader_of
+from app.autopilots.log_readers import reader_of
 from app.core.analysis.analysis import analyze, is_alike
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.prediction import FlightModel

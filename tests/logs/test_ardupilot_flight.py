@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.experiments import ArduPilotLoop
-from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.logged_flight import ardupilot_flight
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, TrajectoryError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pymavlink import DFReader
 
-from app.autopilots.readers import read_takeoff, read_takeoffs
+from app.autopilots.log_readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
 from app.logs.dataflash import read_tables
 from tests.logs.recorded import OnBoardLog, recorded

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.autopilots.readers import read_takeoff
+from app.autopilots.log_readers import read_takeoff
 from app.vehicles.base import FlightOptions
 from tests.vehicles.flying import TAKEOFF, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig

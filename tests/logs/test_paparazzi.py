@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import pytest
 
-from app.autopilots.readers import read_takeoff, read_takeoffs
+from app.autopilots.log_readers import read_takeoff, read_takeoffs
 from app.autopilots.takeoffs import Takeoff
 from app.core.errors import TrajectoryError
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.autopilots.px4.experiments import Px4Loop
-from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.logged_flight import px4_flight
 from app.autopilots.px4.replica.parameters import Parameters
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment

@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v10 import paparazzi
 from pymavlink.dialects.v20 import ardupilotmega, common
 
-from app.autopilots.readers import read_takeoff, read_takeoffs
+from app.autopilots.log_readers import read_takeoff, read_takeoffs
 from app.autopilots.takeoffs import NOT_COMMANDED
 from app.core.errors import TrajectoryError
 from app.logs.takeoff_csv import read_takeoff_csv

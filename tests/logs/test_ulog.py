@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from app.autopilots.log_readers import read_takeoff, read_takeoffs
 from app.autopilots.px4.log import read_px4
-from app.autopilots.readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
 from tests.logs.recorded import ULOG_HEADER as HEADER
 from tests.logs.recorded import recorded

@@ -24,7 +24,7 @@ class Recipe:
 
 STRATEGIES, EXPERIMENTS = "app.core.tuning.strategies", "app.core.experiments"
 PROFILE, VEHICLES = "app.autopilots.paparazzi.profile", "app.vehicles.registry"
-FORMATS, READERS, AUTOPILOTS = "app.logs.formats", "app.autopilots.readers", "app.autopilots.registry"
+FORMATS, READERS, AUTOPILOTS = "app.logs.formats", "app.autopilots.log_readers", "app.autopilots.registry"
 
 REPLICAS = "app.autopilots.replicas"
 TOY: Final = (
@@ -73,7 +73,11 @@ RECIPES: Final = {
             line(FORMATS, "from app.logs.text_log import is_text_log", before="from app.logs.tlog"),
             line(FORMATS, '    TEXT = ".txt"', before="    GZIP ="),
             line(FORMATS, "    (Format.TEXT, is_text_log),", before="    (Format.GROUND_LOG, is_ground_log)"),
-            line(READERS, "from app.autopilots.paparazzi.text import TEXT", before="from app.autopilots.px4.flight"),
+            line(
+                READERS,
+                "from app.autopilots.paparazzi.text import TEXT",
+                before="from app.autopilots.px4.logged_flight",
+            ),
             line(READERS, "    Format.TEXT: Reader(**TEXT),", before="    Format.GROUND_LOG: Reader("),
         ),
     ),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.autopilots.readers import read_content
+from app.autopilots.log_readers import read_content
 
 NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")
 DATABASE = ("pydantic", "sqlalchemy")

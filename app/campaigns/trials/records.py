@@ -152,7 +152,7 @@ def keep_response(row: TrialRow, response: StepResponse | None) -> None:
 
 def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
     """Read a takeoff from an uploaded file, in a process with limits. Raises InputError when it exceeds them."""
-    from app.autopilots.readers import read_content  # noqa: PLC0415 - imports every reader
+    from app.autopilots.log_readers import read_content  # noqa: PLC0415 - imports every reader
 
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 

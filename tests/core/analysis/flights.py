@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from app.autopilots.ardupilot.experiments import ArduPilotLoop
-from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.logged_flight import ardupilot_flight
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import LEAD_S

@@ -3,7 +3,7 @@ import io
 import numpy as np
 import pytest
 
-from app.autopilots.readers import read_takeoff
+from app.autopilots.log_readers import read_takeoff
 from app.core.models.set_points import SetPoints
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import Samples, Trajectory

@@ -8,7 +8,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from app.autopilots.readers import read_takeoff
+from app.autopilots.log_readers import read_takeoff
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.logged_takeoffs import LoggedTakeoff, analyze_takeoffs

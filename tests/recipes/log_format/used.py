@@ -5,7 +5,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from app.autopilots.readers import read_takeoff
+from app.autopilots.log_readers import read_takeoff
 from app.core.errors import TrajectoryError
 
 TIME_S = np.arange(0.0, 40.0, 0.02)

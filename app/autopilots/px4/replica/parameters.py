@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.core.control.parameter_checks import ReplicaParameters, parameter, require_within
 from app.core.errors import InputError, Problem
 
@@ -63,13 +64,6 @@ _RANGES: Final = {_PREDICTION: (0.0, 1e6), _IMU_RATE: (0.0, 1000.0)}
 """With these no step is shorter than 1 ms."""
 ESTIMATOR_NAMES: Final = (_PREDICTION, _IMU_RATE)
 """Parameters on which the interval of the estimates depends."""
-HOVER_THRUSTS: Final = (0.1, 0.8)
-"""Documented range of MPC_THR_HOVER."""
-HOVER_RANGE_NAME: Final = "HTE_THR_RANGE"
-HOVER_RANGE: Final = 0.2
-"""How far the estimated hover thrust may be from MPC_THR_HOVER, by default."""
-_HIGHEST_LOW, _LOWEST_HIGH, _HIGHEST = 0.8, 0.2, 0.9
-"""Ends of its limits, whatever the parameters are."""
 LOOP_NAMES: Final = (*DEFAULTS, *UNSUPPORTED, *ESTIMATOR_NAMES, HOVER_RANGE_NAME)
 """All that the loop depends on."""
 
@@ -88,18 +82,6 @@ def estimator_step_s(values: Mapping[str, float]) -> float:
 def step_parameters(step_s: float) -> dict[str, float]:
     """Parameters with which this is the interval of the estimates, s, of at least 1 ms."""
     return {_PREDICTION: 1e6 * step_s, _IMU_RATE: 1.0 / step_s}
-
-
-def hover_deviation(values: Mapping[str, float]) -> float:
-    """HTE_THR_RANGE of the firmware's values by name, or its default. Raises InputError if it is outside its range."""
-    require_within(values, {HOVER_RANGE_NAME: (0.0, 1.0)})
-    return values.get(HOVER_RANGE_NAME, HOVER_RANGE)
-
-
-def hover_limits(hover_thrust: float, deviation: float) -> tuple[float, float]:
-    """Least and largest hover thrust that the estimator finds, with MPC_THR_HOVER and HTE_THR_RANGE."""
-    low, high = hover_thrust - deviation, hover_thrust + deviation
-    return min(max(low, 0.0), _HIGHEST_LOW), min(max(high, _LOWEST_HIGH), _HIGHEST)
 
 
 def parameters_from(values: Mapping[str, float]) -> Parameters:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.autopilots.readers import SUFFIXES, read_takeoffs
+from app.autopilots.log_readers import SUFFIXES, read_takeoffs
 from app.autopilots.takeoffs import MIN_SAMPLES
 from app.core.errors import TrajectoryError
 from app.logs import base

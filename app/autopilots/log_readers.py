@@ -6,13 +6,13 @@ from io import BytesIO
 from pathlib import PurePath
 from typing import BinaryIO, Final
 
-from app.autopilots.ardupilot.flight import ardupilot_flight
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.logged_flight import ardupilot_flight
 from app.autopilots.copter_tlog import copter_steps
 from app.autopilots.paparazzi.log import HINT as PAPARAZZI_HINT
 from app.autopilots.paparazzi.log import read_paparazzi
-from app.autopilots.px4.flight import px4_flight
 from app.autopilots.px4.log import read_px4
+from app.autopilots.px4.logged_flight import px4_flight
 from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
 from app.autopilots.tlog import HINT as TLOG_HINT
