@@ -140,7 +140,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         server_header=False,
         timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
     )
-    _Server(config, listener, connections, ready=ready, closing=application.state.live.hub.close).run()
+    _Server(config, listener, connections, ready=ready, closing=lambda: application.state.live.hub.close()).run()
 
 
 def _load_numerics() -> None:

@@ -19,7 +19,7 @@ COPIED: Final = ("index.html", "package.json", "public", "src", "tsconfig.json",
 CHANGES: Final = (
     line("pages.ts", 'export { AboutPage } from "./features/settings/AboutPage";', before="export { FlightPage"),
     line("app.tsx", 'const AboutPage = lazyPage("AboutPage");', before="const ComparePage"),
-    line("app.tsx", '        <Route path="about" element={<AboutPage />} />', before='        <Route path="settings"'),
+    line("app.tsx", '        <Route path="/about" component={AboutPage} />', before='        <Route path="/settings"'),
     line("frame/MainNav.tsx", '  { to: "/about", title: "About", inRow: false },', before='  { to: "/settings",'),
 )
 

@@ -15,6 +15,7 @@ from playwright.sync_api import FilePayload, Response, Route, expect
 
 import app.common.errors
 from app.common.errors import (
+    ForeignRequestError,
     BusyError,
     ConflictError,
     GainlineError,
@@ -40,7 +41,7 @@ from tests.waiting import Waits
 
 AT_START: Final = {app.common.errors.SchemaError, app.common.errors.AlreadyRunningError, app.common.errors.AddressError}
 """These end the program before it answers anybody."""
-FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unexpected")
+FRAMEWORK: Final = ("400", "404", "405", "invalid", "unexpected")
 """Responses that do not come from the application's own code."""
 OWN_WORDS: Final[dict[object, str]] = {
     LinkDownError: "It is sent again until the worker confirms it. If a vehicle is in the air, use its own remote"
@@ -282,7 +283,7 @@ def _a_budget_below_nothing(dashboard: Dashboard, _server: Server, _states: Stat
     dashboard.button("Create campaign").click()
 
 
-@provokes("foreign")
+@provokes(ForeignRequestError)
 def _a_page_of_another_site(dashboard: Dashboard, _server: Server, _states: States) -> None:
     create_instead(dashboard, headers={"origin": "http://elsewhere.example"})
 
@@ -302,7 +303,7 @@ def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: S
 
 TITLES: Final = {
     "400": "Bad Request", "404": "Not Found", "405": "Method Not Allowed", "invalid": "Unusable input",
-    "foreign": "Foreign request", "unexpected": "Internal Server Error",
+    "unexpected": "Internal Server Error",
 }  # fmt: skip
 
 
