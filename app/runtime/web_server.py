@@ -129,6 +129,9 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         announce(f"Gainline is ready at {address}")
         _announce_links(settings, listener.getsockname()[1], application.state.keyring, announce)
 
+    def closing() -> None:
+        application.state.live.hub.close()
+
     connections = Connections(room_for_connections(resource.getrlimit(resource.RLIMIT_NOFILE)[0]), REAL_TIME)
     config = uvicorn.Config(
         application,
@@ -140,7 +143,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         server_header=False,
         timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
     )
-    _Server(config, listener, connections, ready=ready, closing=lambda: application.state.live.hub.close()).run()
+    _Server(config, listener, connections, ready=ready, closing=closing).run()
 
 
 def _load_numerics() -> None:

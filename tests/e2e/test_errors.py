@@ -15,9 +15,9 @@ from playwright.sync_api import FilePayload, Response, Route, expect
 
 import app.common.errors
 from app.common.errors import (
-    ForeignRequestError,
     BusyError,
     ConflictError,
+    ForeignRequestError,
     GainlineError,
     GainsError,
     InputError,
