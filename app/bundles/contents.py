@@ -27,6 +27,7 @@ from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 from app.db.base import JsonObject
 from app.db.earlier_ends import give_end
+from app.vehicles.flight_end import FlightEnd
 from app.vehicles.registry import IMPORT
 
 FORMAT: Final = "gainline-campaign"
@@ -36,6 +37,8 @@ CONTENTS: Final = "contents.json"
 
 MAX_CAMPAIGNS: Final = 20
 """Maximum number of campaigns in one bundle."""
+
+_MAX_CHARACTERS: Final = 10_000
 
 Count = Annotated[int, Field(ge=0, le=2**53)]
 ShortText = Annotated[str, Field(max_length=200)]
@@ -66,10 +69,17 @@ class _Spread(ParameterDistribution):
     flights: list[int] | None = None
 
 
+def _concise(given: FlightEnd) -> FlightEnd:
+    words = given.remarks if given.request is None else (*given.remarks, given.request.words)
+    if sum(map(len, words)) > _MAX_CHARACTERS:
+        raise ValueError(f"has more than {_MAX_CHARACTERS} characters")
+    return given
+
+
 class _Strict(Schema):
     """A part of the contents: no other fields, no numbers that are not finite, no endless text."""
 
-    model_config = ConfigDict(extra="forbid", from_attributes=True, allow_inf_nan=False, str_max_length=10_000)
+    model_config = ConfigDict(extra="forbid", from_attributes=True, allow_inf_nan=False, str_max_length=_MAX_CHARACTERS)
 
     def values_without(self, names: Set[str]) -> dict[str, Any]:
         """The other fields with their values as they came; a dump would change the types of stored numbers."""
@@ -129,6 +139,7 @@ class Trial(TrialFacts, _Strict):
     record: Record | None
     curve: Annotated[list[tuple[float, float]], Field(max_length=5000)] | None
     ending: Ending | None
+    end: Annotated[FlightEnd, AfterValidator(_concise)] | None
     settings: Options
     glitches: list[Annotated[JsonObject, _fits(Glitch)]] | None
     landing_battery_v: float | None

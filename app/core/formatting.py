@@ -90,6 +90,11 @@ def allowed_range(lower: float | None, upper: float | None) -> str:
     return f"at least {lower:g}" if upper is None else f"between {lower:g} and {upper:g}"
 
 
+def capitalised(sentence: str) -> str:
+    """With a capital at its beginning; the rest as it is."""
+    return sentence[:1].upper() + sentence[1:]
+
+
 def count(amount: int, noun: str) -> str:
     """`1 flight`, `2 flights`."""
     return f"{amount} {noun}{'' if amount == 1 else 's'}"

@@ -6,7 +6,8 @@ A cursor is that position, so that the next page begins there whatever was added
 import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, TypeVar
+from functools import cache
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AwareDatetime, Field, TypeAdapter
 from pydantic_core import to_json
@@ -21,7 +22,12 @@ R = TypeVar("R", bound=Reported)
 V = TypeVar("V")
 
 _Id = Annotated[int, Field(gt=0, le=2**63 - 1)]
-_ANY_CURSOR: Final = TypeAdapter(tuple[str, Any, _Id])
+
+
+@cache
+def _cursor_of(kind: Any) -> TypeAdapter[tuple[str, Any, int]]:
+    """Reader of cursors of an order by values of this kind."""
+    return TypeAdapter(tuple[str, kind, _Id])
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +49,9 @@ class Order:
         kind: Any = AwareDatetime if is_time else str if is_text else Number
         try:
             packed = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True)
-            order, _, identity = _ANY_CURSOR.validate_json(packed, strict=True)
+            order, _, identity = _cursor_of(Any).validate_json(packed, strict=True)
             if order == self.name:
-                return TypeAdapter(tuple[str, kind, _Id]).validate_json(packed, strict=True)[1], identity
+                return _cursor_of(kind).validate_json(packed, strict=True)[1], identity
         except ValueError:
             raise _refused("is not a cursor of this list") from None
         raise _refused("belongs to a different sort order of the list")

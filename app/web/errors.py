@@ -223,9 +223,9 @@ def reason_of(found: Mapping[str, Any], schema: object = None) -> str:
         return message[:1].lower() + message[1:]
     written = {name: f"{limit:g}" if isinstance(limit, float) else limit for name, limit in limits.items()}
     reason = _REASONS[kind].format_map(written)
-    text = str(value).lower() if isinstance(value, bool) else repr(value)  # as JSON has it
-    is_short = isinstance(value, bool | int | float | str) and len(str(value)) <= _SHOWN
-    return f"{reason}, got {text}" if kind in _QUOTED and is_short else reason
+    if kind not in _QUOTED or not isinstance(value, bool | int | float | str) or len(str(value)) > _SHOWN:
+        return reason
+    return f"{reason}, got {str(value).lower() if isinstance(value, bool) else repr(value)}"  # as JSON has it
 
 
 def _fields_at(schema: object, path: Sequence[object], kind: str) -> tuple[str, ...]:

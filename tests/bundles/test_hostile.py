@@ -215,6 +215,8 @@ def at(path: str, value: object) -> Change:
         ("trials.0.seed", -1, "trials.0.seed"),
         ("trials.0.note", "x" * 10_001, "trials.0.note"),
         ("trials.0.end", {"remarks": ["x" * 10_001]}, "trials.0.end"),
+        ("trials.0.end", {"remarks": ["x" * 1000] * 11}, "trials.0.end"),
+        ("trials.0.end", {"remarks": ["x" * 6000], "request": {"words": "y" * 6000}}, "trials.0.end"),
         ("trials.0.flown_at", "2026-11-22T10:00:00", "trials.0.flown_at"),
         ("trials.0.record.columns", ["altitude_m", "time_s"], "trials.0.record.columns"),
         ("trials.0.record.columns", ["time_s", "feet"], "trials.0.record.columns"),

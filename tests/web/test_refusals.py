@@ -48,6 +48,14 @@ def test_a_refused_value_has_a_reason_in_plain_words(body: dict[str, Any], reaso
     assert [reason_of(found, Body) for found in refused.value.errors()] == [reason]
 
 
+def test_a_refused_value_that_is_not_repeated_is_not_written_out() -> None:
+    deeper_than_python_writes: list[Any] = []
+    for _ in range(100_000):
+        deeper_than_python_writes = [deeper_than_python_writes]
+    found = {"type": "missing", "loc": ("body", "name"), "input": deeper_than_python_writes}
+    assert reason_of(found, Body) == "is missing"
+
+
 def test_a_request_with_an_unknown_field_is_told_the_known_ones(client: TestClient) -> None:
     answer = client.post("/api/campaigns", json={"name": "A", "vehicl": {}, "vehicle": "twin"})
     reasons = {problem["field"]: problem["reason"] for problem in answer.json()["problems"]}

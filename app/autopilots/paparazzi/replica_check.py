@@ -45,7 +45,7 @@ from app.core.control.vertical_guidance import (
     replayed,
 )
 from app.core.errors import InputError, Problem
-from app.core.formatting import format_gains
+from app.core.formatting import capitalised, format_gains
 from app.core.policy import Gains
 from app.core.records.trajectory import Overlay
 from app.logs.trace_table import TraceChecks, read_rows, text_of, unzipped
@@ -139,7 +139,7 @@ def _check_log(recording: Recording, name: str, given: str) -> ReplicaCheck:
     source = "given" if given else "of the log" if recording.are_logged else "computed from the commands"
     better = computed[0].gains if len(computed) == 1 and computed[0].gains != flown[0].gains else None
     commands, simulation = compare_commands(recording.loop, flown), compare_simulation(recording.loop)
-    notes = [f"{note[0].upper()}{note[1:]}." for note in recording.notes]
+    notes = [f"{capitalised(note)}." for note in recording.notes]
     if len(flown) > 1:
         texts = [format_gains(each.gains) if each.gains else "unknown" for each in flown]
         changes = [f"after {each.after_s:.1f} s {text}" for each, text in zip(flown, texts, strict=True)]

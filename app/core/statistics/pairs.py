@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from app.core.formatting import confidence_text, count, direction_of, format_gains, measured
+from app.core.formatting import capitalised, confidence_text, count, direction_of, format_gains, measured
 from app.core.statistics.comparisons import (
     Comparison,
     FlightsToDecide,
@@ -165,10 +165,6 @@ def list_notes(sides: Sequence[Side]) -> list[str]:
         if campaigns[population] > 1 and scatter.known
     ]
     return [*apart, *shared]
-
-
-def capitalised(sentence: str) -> str:
-    return sentence[:1].upper() + sentence[1:]
 
 
 def _apart(side: Side, own: Group, against: Side, other: Group) -> PairVerdict:

@@ -25,7 +25,7 @@ import numpy as np
 
 from app.core.definition import Flight, Interval
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, normal_distribution
-from app.core.formatting import count
+from app.core.formatting import capitalised, count
 from app.core.models.vertical import ENTERED
 from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
@@ -92,7 +92,7 @@ class TrackRecord:
             "prediction"
         )
         counted = "; ".join(parts)
-        return f"{counted[:1].upper()}{counted[1:]}{ending}."
+        return f"{capitalised(counted)}{ending}."
 
 
 def is_informative(interval: Interval | None, *, corrected: bool) -> bool:

@@ -209,9 +209,7 @@ class TrialRunner:
     def _perform(self, command: PerformAction) -> None:
         action, (profile, target) = command.action, (self._radio.profile, self._radio.target)
         if command.altitude_m is not None:
-            if (
-                action is Action.HOLD
-            ):  # set points are flown at the place where it hovers as it begins to hold the first
+            if action is Action.HOLD:  # all set points are flown where it hovers as it begins to hold the first
                 last = self.trial.watch.last
                 self._target = replace(self._target, north_m=last.north_m, east_m=last.east_m)
             target = self._target = replace(
