@@ -182,8 +182,12 @@ class FlightLoop(FlightExecution):
 
     def _carry_out(self, asked: ToVehicleProcess) -> None:
         if isinstance(asked, FlightRequest):  # anything else belongs to a flight that is over
-            for message in self.fly(asked):
-                self._line.send(message)
+            flight = self.fly(asked)
+            for message in flight:
+                try:
+                    self._line.send(message)
+                except Exception as error:  # noqa: BLE001 - fails the flight, like an error of its vehicle
+                    self._line.send(flight.throw(error))
 
     def _should_stop(self) -> StopRequest | None:
         """Poll the pipe, which takes microseconds."""

@@ -1,10 +1,13 @@
 """The process that flies, with real simulated vehicles."""
 
+import math
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
+from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +16,18 @@ import pytest
 from app.autopilots.registry import get_experiment
 from app.common.data_folder import vehicle_lock
 from app.core.clock import REAL_TIME
-from app.flights.flight_loop import FlightMonitor, run_simulations
+from app.flights.flight_loop import FlightMonitor, PipeClosedError, SimulationLoop, WorkerPipe, run_simulations
 from app.flights.flight_process import FlightProcess
-from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
+from app.flights.process_messages import (
+    FlightFailure,
+    FlightFinished,
+    FlightLanded,
+    FlightMessage,
+    FlightRequest,
+    FromVehicleProcess,
+    GainsStaged,
+    TakeOffDecision,
+)
 from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
 from app.processes.locks import exclusive
 from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
@@ -136,6 +148,38 @@ def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(flight
     assert isinstance(trouble, FlightFailure)
     assert not trouble.unsafe
     assert landed_of(fly(flight_process, flight_of())).ending == "completed"
+
+
+class ForgetfulPipe(WorkerPipe):
+    """A real pipe whose process has no memory for the record of a flight."""
+
+    def send(self, message: FromVehicleProcess) -> None:
+        if isinstance(message, FlightLanded):
+            raise MemoryError
+        super().send(message)
+
+
+def test_a_record_that_cannot_be_sent_is_trouble_of_its_flight_and_the_loop_goes_on(tmp_path: Path) -> None:
+    here, there = Pipe()
+    worker = threading.Thread(
+        target=run_until_closed, args=(SimulationLoop(ForgetfulPipe(there), tmp_path, REAL_TIME),)
+    )
+    worker.start()
+    for trial_id in (1, 2):
+        here.send(flight_of(trial_id=trial_id))
+        heard: list[FromVehicleProcess] = []
+        while not isinstance(said := here.recv(), FlightFinished):
+            heard.append(said)
+            if isinstance(said, GainsStaged):
+                here.send(TakeOffDecision(by_s=math.inf))
+        assert [said.what for said in heard if isinstance(said, FlightFailure)] == ["Internal error (MemoryError: )."]
+    here.close()
+    worker.join()
+
+
+def run_until_closed(loop: SimulationLoop) -> None:
+    with suppress(PipeClosedError):
+        loop.run()
 
 
 def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> None:
