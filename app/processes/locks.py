@@ -13,6 +13,7 @@ from typing import Final
 from app.common.errors import StorageError
 from app.core.clock import REAL_TIME, Clock
 
+_SIGNATURE_BYTES: Final = 4096
 POLL_S: Final = 0.1
 
 
@@ -65,7 +66,8 @@ def exclusive(
 def signature(path: Path) -> Holder | None:
     """The present or last holder of the lock file at `path`; None if it is unknown."""
     try:
-        return Holder(**json.loads(path.read_bytes()))
+        with path.open("rb") as file:
+            return Holder(**json.loads(file.read(_SIGNATURE_BYTES)))
     except (OSError, ValueError, TypeError):
         return None
 
