@@ -12,6 +12,7 @@ from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
 from app.common.data_folder import telemetry_log
 from app.common.settings import Settings
+from app.common.states import FlightState
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.session import Database
 from tests.builders import (
@@ -174,6 +175,23 @@ def test_a_simulated_campaign_flies_on_where_it_arrives(
     there, their_database = elsewhere
     arrived = brought(there, download_bundle(client, campaign["id"]))
     assert fly(there, their_database, arrived["id"])["number"] == 4
+
+
+@pytest.mark.complete
+def test_a_flight_withdrawn_later_does_not_hide_the_telemetry_log(
+    client: TestClient, database: Database, settings: Settings, campaign: Json
+) -> None:
+    """The bundle has the log that the flight's page offers."""
+    with database.write() as session:
+        flight = session.query(FlightRow).order_by(FlightRow.id).first()
+        assert flight is not None
+        log, trial_id = telemetry_log(settings.data_dir, flight.id), flight.trial_id
+        session.add(FlightRow(campaign_id=campaign["id"], trial_id=trial_id, vehicle_id=flight.vehicle_id,
+                              state=FlightState.CANCELLED, gains=flight.gains))  # fmt: skip
+    log.parent.mkdir(exist_ok=True)
+    log.write_bytes(b"telemetry")
+    assert client.get(f"/api/trials/{trial_id}/tlog").content == b"telemetry"
+    assert parts_of(download_bundle(client, campaign["id"]))[f"telemetry/{trial_id}.tlog"] == b"telemetry"
 
 
 @pytest.mark.complete
