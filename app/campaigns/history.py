@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 from sqlalchemy import Row, func, select
 from sqlalchemy.orm import Session, defer
 
@@ -39,6 +40,7 @@ from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
 from app.vehicles.flight_end import FlightEnd, not_begun
 
+_INTERVAL: Final = TypeAdapter(Interval)
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
 FLOWN: Final = frozenset(
@@ -212,7 +214,7 @@ def told_prediction(
 ) -> tuple[float | None, Interval | None]:
     """The stored error and interval of a prediction; both None if they say nothing. `corrected`: whether a flight had
     corrected the model before."""
-    interval = None if stored is None else Interval(**stored)
+    interval = _interval(stored)
     if not is_informative(interval, corrected=corrected):
         return None, None
     return error, interval
@@ -250,13 +252,15 @@ def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, param
         outcome="valid" if row.state == TrialState.VALID else "aborted",
         predicted=None
         if row.predicted_error is None
-        else Prediction(
-            error=row.predicted_error,
-            interval=None if row.predicted_interval is None else Interval(**row.predicted_interval),
-        ),
+        else Prediction(error=row.predicted_error, interval=_interval(row.predicted_interval)),
         against_gains=_is_against_gains(row),
         parameters=parameters,
     )
+
+
+def _interval(stored: JsonObject | None) -> Interval | None:
+    """A stored interval; from a bundle it may have further fields."""
+    return None if stored is None else _INTERVAL.validate_python(stored)
 
 
 def _numbers(settings: OptionsJson) -> dict[str, float]:

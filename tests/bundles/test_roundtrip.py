@@ -304,6 +304,18 @@ def test_what_a_bundle_cannot_hold_is_refused_in_words(client: TestClient, datab
     assert "cannot be exported as a bundle: curve: List should have at most 5000 items" in refused.json()["detail"]
 
 
+def test_a_predicted_interval_with_further_fields_is_read_without_them(
+    client: TestClient, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, _ = elsewhere
+    parts = parts_of(download_bundle(client, campaign["id"]))
+    contents = json.loads(parts["contents.json"])
+    interval = {"lower": 0.25, "upper": 0.75, "confidence": 0.9}
+    contents["campaigns"][0]["trials"][-1] |= {"predicted_error": 0.5, "predicted_interval": interval | {"more": 1}}
+    arrived = brought(there, sealed({**parts, "contents.json": json.dumps(contents).encode()}))
+    assert get(there, f"/api/campaigns/{arrived['id']}/trials")["items"][-1]["predicted_interval"] == interval
+
+
 def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestClient, campaign: Json) -> None:
     bundle = download_bundle(client, campaign["id"])
     sent = [
