@@ -7,11 +7,11 @@ import json
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from pydantic import TypeAdapter
-from sqlalchemy import Row, func, select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
 from app.autopilots.registry import experiment_of
@@ -47,11 +47,6 @@ FLOWN: Final = frozenset(
     {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
 )
 """States of trials that have left the ground."""
-_TOLD_BY_A_FLIGHT: Final = (
-    *(TrialRow.number, TrialRow.gains, TrialRow.error, TrialRow.state, TrialRow.abort_cause),
-    *(TrialRow.predicted_error, TrialRow.predicted_interval),
-)
-"""What the core learns of a trial beside its record and settings."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -118,9 +113,13 @@ def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The scored flights in their order, with gains and errors only, so that many are read quickly."""
-    scored = TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
-    found = session.execute(select(*_TOLD_BY_A_FLIGHT).where(*scored).order_by(TrialRow.number))
-    return tuple(_flight(row, _NOTHING, {}) for row in found)
+    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
+        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
+    )
+    return tuple(
+        Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
+        for number, gains, error in session.execute(wanted.order_by(TrialRow.number))
+    )
 
 
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
@@ -243,7 +242,7 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
         ) from error
 
 
-def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
+def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
     return Flight(
         number=row.number,
         gains=row.gains,
@@ -272,7 +271,7 @@ def _numbers(settings: OptionsJson) -> dict[str, float]:
     }
 
 
-def _is_against_gains(row: TrialRow | Row[*tuple[Any, ...]]) -> bool:
+def _is_against_gains(row: TrialRow) -> bool:
     """Whether an aborted trial counts against its gains; True for every other trial."""
     return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
 
