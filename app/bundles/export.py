@@ -30,7 +30,7 @@ from app.bundles.contents import (
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
-from app.campaigns.trials.records import telemetry_log_of
+from app.campaigns.trials.records import telemetry_logs
 from app.common.errors import BusyError, ConflictError, StorageError
 from app.db.base import utc_now
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
@@ -97,6 +97,8 @@ class Packer:
         wanted = select(ProposalRow).where(ProposalRow.campaign_id == row.id).order_by(ProposalRow.id)
         proposals = self._session.scalars(wanted).all()
         places = {proposal.id: place for place, proposal in enumerate(proposals)}
+        trials = history.trials_of(self._session, row.id)
+        logs = telemetry_logs(self._session, [trial.id for trial in trials], self._data_dir)
         photos: dict[int, list[TrialPhotoRow]] = {}
         for photo, _ in photos_of_campaign(self._session, row.id):
             photos.setdefault(photo.trial_id, []).append(photo)
@@ -110,9 +112,9 @@ class Packer:
                     record=self._record(trial.trajectory, refused_for((trial,), "The bundle was not created")),
                     predicted=self._record(trial.predicted, _damaged_curve(f"flight {trial.number}", row)),
                     photos=[self._photo(trial, photo) for photo in photos.get(trial.id, [])],
-                    telemetry=self._telemetry(trial),
+                    telemetry=self._telemetry(trial, logs.get(trial.id)),
                 )
-                for trial in history.trials_of(self._session, row.id)
+                for trial in trials
             ],
             proposals=[
                 Proposal.view_of(
@@ -142,9 +144,8 @@ class Packer:
         self._session.expire(row, ["data"])
         return Photo.view_of(row, part=part)
 
-    def _telemetry(self, row: TrialRow) -> str | None:
-        found = telemetry_log_of(self._session, row.id, self._data_dir)
-        return None if found is None else self._write(f"telemetry/{row.id}.tlog", found.read_bytes(), squeeze=True)
+    def _telemetry(self, row: TrialRow, log: Path | None) -> str | None:
+        return None if log is None else self._write(f"telemetry/{row.id}.tlog", log.read_bytes(), squeeze=True)
 
 
 def _vehicle(row: VehicleRow) -> Vehicle:

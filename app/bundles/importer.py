@@ -89,6 +89,7 @@ def _trials(
     """Store trials in large batches, because other writers wait meanwhile, but limited by memory."""
     made: list[TrialRow] = []
     waiting: list[TrajectoryRow | TrialPhotoRow] = []
+    size = 0
     for each in sources:
         row = TrialRow(
             campaign_id=campaign.id,
@@ -104,9 +105,12 @@ def _trials(
         ]
         session.add_all((row, *photos))
         made.append(row)
-        waiting += [*photos, *filter(None, (row.trajectory, row.predicted))]
-        if sum(len(one.data) for one in waiting) > _AT_ONCE_BYTES:
+        held: list[TrajectoryRow | TrialPhotoRow] = [*photos, *filter(None, (row.trajectory, row.predicted))]
+        waiting += held
+        size += sum(len(one.data) for one in held)
+        if size > _AT_ONCE_BYTES:
             _settle(session, waiting)
+            size = 0
     _settle(session, waiting)
     return made
 

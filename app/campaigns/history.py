@@ -7,10 +7,11 @@ import json
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from sqlalchemy import Row, func, select
+from pydantic import TypeAdapter
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
 from app.autopilots.registry import experiment_of
@@ -39,17 +40,13 @@ from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
 from app.vehicles.flight_end import FlightEnd, not_begun
 
+_INTERVAL: Final = TypeAdapter(Interval)
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
 FLOWN: Final = frozenset(
     {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
 )
 """States of trials that have left the ground."""
-_TOLD_BY_A_FLIGHT: Final = (
-    *(TrialRow.number, TrialRow.gains, TrialRow.error, TrialRow.state, TrialRow.abort_cause),
-    *(TrialRow.predicted_error, TrialRow.predicted_interval),
-)
-"""What the core learns of a trial beside its record and settings."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -116,9 +113,13 @@ def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The scored flights in their order, with gains and errors only, so that many are read quickly."""
-    scored = TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
-    found = session.execute(select(*_TOLD_BY_A_FLIGHT).where(*scored).order_by(TrialRow.number))
-    return tuple(_flight(row, _NOTHING, {}) for row in found)
+    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
+        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
+    )
+    return tuple(
+        Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
+        for number, gains, error in session.execute(wanted.order_by(TrialRow.number))
+    )
 
 
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
@@ -212,7 +213,7 @@ def told_prediction(
 ) -> tuple[float | None, Interval | None]:
     """The stored error and interval of a prediction; both None if they say nothing. `corrected`: whether a flight had
     corrected the model before."""
-    interval = None if stored is None else Interval(**stored)
+    interval = _interval(stored)
     if not is_informative(interval, corrected=corrected):
         return None, None
     return error, interval
@@ -241,7 +242,7 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
         ) from error
 
 
-def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
+def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
     return Flight(
         number=row.number,
         gains=row.gains,
@@ -250,13 +251,15 @@ def _flight(row: TrialRow | Row[*tuple[Any, ...]], trajectory: Trajectory, param
         outcome="valid" if row.state == TrialState.VALID else "aborted",
         predicted=None
         if row.predicted_error is None
-        else Prediction(
-            error=row.predicted_error,
-            interval=None if row.predicted_interval is None else Interval(**row.predicted_interval),
-        ),
+        else Prediction(error=row.predicted_error, interval=_interval(row.predicted_interval)),
         against_gains=_is_against_gains(row),
         parameters=parameters,
     )
+
+
+def _interval(stored: JsonObject | None) -> Interval | None:
+    """A stored interval; from a bundle it may have further fields."""
+    return None if stored is None else _INTERVAL.validate_python(stored)
 
 
 def _numbers(settings: OptionsJson) -> dict[str, float]:
@@ -268,7 +271,7 @@ def _numbers(settings: OptionsJson) -> dict[str, float]:
     }
 
 
-def _is_against_gains(row: TrialRow | Row[*tuple[Any, ...]]) -> bool:
+def _is_against_gains(row: TrialRow) -> bool:
     """Whether an aborted trial counts against its gains; True for every other trial."""
     return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
 

@@ -100,11 +100,13 @@ def photos_of_trial(session: Session, trial_id: int) -> Sequence[TrialPhotoRow]:
     ).all()
 
 
-def flight_ids(session: Session, trial_id: int) -> Sequence[int]:
-    """Flight ids of a trial, newest first."""
-    return session.scalars(
-        select(FlightRow.id).where(FlightRow.trial_id == trial_id).order_by(FlightRow.id.desc())
-    ).all()
+def flight_ids(session: Session, trial_ids: Collection[int]) -> Mapping[int, Sequence[int]]:
+    """Flight ids of these trials, newest first, by trial id."""
+    wanted = select(FlightRow.trial_id, FlightRow.id).where(FlightRow.trial_id.in_(trial_ids))
+    found: dict[int, list[int]] = {}
+    for trial_id, flight_id in session.execute(wanted.order_by(FlightRow.id.desc())):
+        found.setdefault(trial_id, []).append(flight_id)
+    return found
 
 
 _NO_ERROR: Final = 1e300

@@ -216,6 +216,13 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
     rows = [found[trial_id] for trial_id in trial_ids]
     groups = {key: groups_of(history.flown_gains(history.trials_of(session, key))) for key in campaigns}
     populations = {key: population_of(campaigns[key], experiments[key]) for key in campaigns}
+    priors = {population: experiments[key].scatter for key, population in populations.items()}
+    scatters = {
+        population: pool_scatter(
+            [each for key, own in groups.items() if populations[key] == population for each in own], prior
+        )
+        for population, prior in priors.items()
+    }
     return [
         ComparisonFlight(
             row=row,
@@ -227,10 +234,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
             campaign_id=row.campaign_id,
             error_unit=experiment.error_unit,
             group=next((group for group in groups[row.campaign_id] if row.number in group.numbers), None),
-            scatter=pool_scatter(
-                [each for key, own in groups.items() if populations[key] == population for each in own],
-                experiment.scatter,
-            ),
+            scatter=scatters[population],
             population=population,
         )
         for row, label, name in zip(rows, LABELS, names_of(rows), strict=False)

@@ -12,6 +12,7 @@ from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
 from app.common.data_folder import telemetry_log
 from app.common.settings import Settings
+from app.common.states import FlightState
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.session import Database
 from tests.builders import (
@@ -177,6 +178,23 @@ def test_a_simulated_campaign_flies_on_where_it_arrives(
 
 
 @pytest.mark.complete
+def test_a_flight_withdrawn_later_does_not_hide_the_telemetry_log(
+    client: TestClient, database: Database, settings: Settings, campaign: Json
+) -> None:
+    """The bundle has the log that the flight's page offers."""
+    with database.write() as session:
+        flight = session.query(FlightRow).order_by(FlightRow.id).first()
+        assert flight is not None
+        log, trial_id = telemetry_log(settings.data_dir, flight.id), flight.trial_id
+        session.add(FlightRow(campaign_id=campaign["id"], trial_id=trial_id, vehicle_id=flight.vehicle_id,
+                              state=FlightState.CANCELLED, gains=flight.gains))  # fmt: skip
+    log.parent.mkdir(exist_ok=True)
+    log.write_bytes(b"telemetry")
+    assert client.get(f"/api/trials/{trial_id}/tlog").content == b"telemetry"
+    assert parts_of(download_bundle(client, campaign["id"]))[f"telemetry/{trial_id}.tlog"] == b"telemetry"
+
+
+@pytest.mark.complete
 def test_what_a_registered_vehicle_flew_is_history_where_it_arrives(
     client: TestClient, database: Database, settings: Settings, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
@@ -284,6 +302,18 @@ def test_what_a_bundle_cannot_hold_is_refused_in_words(client: TestClient, datab
     refused = client.get(f"/api/campaigns/{campaign['id']}/bundle")
     assert refused.status_code == 409, refused.text
     assert "cannot be exported as a bundle: curve: List should have at most 5000 items" in refused.json()["detail"]
+
+
+def test_a_predicted_interval_with_further_fields_is_read_without_them(
+    client: TestClient, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, _ = elsewhere
+    parts = parts_of(download_bundle(client, campaign["id"]))
+    contents = json.loads(parts["contents.json"])
+    interval = {"lower": 0.25, "upper": 0.75, "confidence": 0.9}
+    contents["campaigns"][0]["trials"][-1] |= {"predicted_error": 0.5, "predicted_interval": interval | {"more": 1}}
+    arrived = brought(there, sealed({**parts, "contents.json": json.dumps(contents).encode()}))
+    assert get(there, f"/api/campaigns/{arrived['id']}/trials")["items"][-1]["predicted_interval"] == interval
 
 
 def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestClient, campaign: Json) -> None:

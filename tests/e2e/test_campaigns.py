@@ -11,6 +11,7 @@ from tests.e2e.dashboard import Dashboard, printed
 from tests.e2e.states import States
 
 _COUNT = "window.clicks = 0; addEventListener('click', event => { if (event.isTrusted) window.clicks += 1 }, true)"
+_COUNT_TOPS = "window.tops = 0; window.scrollTo = () => { window.tops += 1 }; undefined"
 
 
 def clicks(page: Page) -> int:
@@ -215,6 +216,22 @@ def test_a_page_opens_at_its_top_wherever_the_one_before_was_scrolled_to(dashboa
     link.click()
     expect(page).to_have_url(re.compile("/flights/"))
     dashboard.until(lambda: page.evaluate("window.scrollY") == 0)
+
+
+def test_going_back_shows_a_page_where_it_was_left(dashboard: Dashboard, states: States) -> None:
+    """Going back within a page, as to an address without `#main`, leaves the next one to open at its top."""
+    dashboard.open(f"/campaigns/{states.campaign(flights=1)}")
+    page = dashboard.page
+    page.evaluate(_COUNT_TOPS)
+    page.evaluate("history.pushState(null, '', '#main')")
+    page.go_back()
+    link = page.get_by_role("link", name="Open flight").first
+    link.click()
+    expect(page).to_have_url(re.compile("/flights/"))
+    assert page.evaluate("window.tops") == 1
+    page.go_back()
+    expect(link).to_be_visible()
+    assert page.evaluate("window.tops") == 1
 
 
 def test_the_numbers_behind_a_chart_stand_in_a_table(dashboard: Dashboard, states: States) -> None:

@@ -4,7 +4,7 @@ A record is scored as it is stored, in single precision.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -340,15 +340,20 @@ def export_trajectory(session: Session, trial_id: int) -> tuple[str, str, str]:
     return name, "\n".join(lines) + "\n", row.trajectory.checksum
 
 
-def telemetry_log_of(session: Session, trial_id: int, data_dir: Path) -> Path | None:
-    """Telemetry log of the trial's last flight that has one, else the one imported with the trial, if any."""
-    flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
-    return next((file for file in (*flown, log_of_trial(data_dir, trial_id)) if file.is_file()), None)
+def telemetry_logs(session: Session, trial_ids: Collection[int], data_dir: Path) -> Mapping[int, Path]:
+    """By trial id, the telemetry log of the trial's last flight that has one, else the one imported with the trial."""
+    flights = repository.flight_ids(session, trial_ids)
+    found: dict[int, Path] = {}
+    for trial_id in trial_ids:
+        flown = [telemetry_log(data_dir, flight_id) for flight_id in flights.get(trial_id, ())]
+        if file := next(filter(Path.is_file, (*flown, log_of_trial(data_dir, trial_id))), None):
+            found[trial_id] = file
+    return found
 
 
 def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> tuple[Path, str]:
     """Telemetry log of the trial, and its name for download. Raises NotFoundError when there is none."""
     row = history.trial_row(session, trial_id)
-    if (file := telemetry_log_of(session, trial_id, data_dir)) is None:
+    if (file := telemetry_logs(session, [trial_id], data_dir).get(trial_id)) is None:
         raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")
     return file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog"

@@ -1,6 +1,6 @@
 /** All mutations. The event stream invalidates queries; responses are stored in the cache immediately. */
 
-import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { type UseMutationOptions, useMutation, useQueryClient } from "@tanstack/react-query";
 import { navigate } from "wouter/use-browser-location";
 import { answer } from "./client";
 import {
@@ -34,26 +34,32 @@ import { controlHeader } from "./leases";
 import type { RecordFiles } from "./records";
 import { useVehicleChanged } from "./vehicles";
 
-/** Has all that is shown of campaigns read again. */
-function useStaleCampaigns() {
+/** Has all that is shown of a campaign read again. */
+function useStaleCampaign(campaignId: number) {
   const queries = useQueryClient();
-  return () => queries.invalidateQueries({ queryKey: ["campaign"] });
+  return () => queries.invalidateQueries({ queryKey: ["campaign", campaignId] });
 }
 
+type After<Answer, Sent> = Pick<UseMutationOptions<Answer, Error, Sent>, "onError" | "onSettled">;
+
 /** A request that is answered with a campaign, which is stored. */
-function useCampaignRequest<Sent>(send: (sent: Sent) => Promise<Campaign>) {
+function useCampaignRequest<Sent>(send: (sent: Sent) => Promise<Campaign>, after: After<Campaign, Sent> = {}) {
   return useMutation({
     mutationFn: send,
     onSuccess: (campaign, _sent, _before, { client }) => {
       client.setQueryData(["campaign", campaign.id], campaign);
       void client.invalidateQueries({ queryKey: ["campaigns"] });
     },
-    onSettled: useStaleCampaigns(),
+    ...after,
   });
 }
 
 /** A request that is answered with a trial, which is stored; everything else of its campaign follows from it. */
-function useTrialRequest<Sent>(send: (sent: Sent) => Promise<Trial>, onStored?: (trial: Trial, sent: Sent) => void) {
+function useTrialRequest<Sent>(
+  send: (sent: Sent) => Promise<Trial>,
+  after: After<Trial, Sent> = {},
+  onStored?: (trial: Trial, sent: Sent) => void,
+) {
   return useMutation({
     mutationFn: send,
     onSuccess: (trial, sent, _before, { client }) => {
@@ -64,7 +70,7 @@ function useTrialRequest<Sent>(send: (sent: Sent) => Promise<Trial>, onStored?: 
         client.invalidateQueries({ queryKey: ["flying"] }),
       ]);
     },
-    onError: useStaleCampaigns(),
+    ...after,
   });
 }
 
@@ -77,13 +83,16 @@ export function useCreateCampaign() {
 export function useCreateTrial({ id, vehicle }: Campaign) {
   return useTrialRequest(
     (body: NewTrial) => answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
+    { onError: useStaleCampaign(id) },
     (trial, { fly }) => vehicle.registered && !fly && navigate(`/fly/${trial.id}`),
   );
 }
 
-export function useFlyTrial({ vehicle }: Campaign) {
-  return useTrialRequest(({ trialId, speed }: { trialId: number; speed: number | null }) =>
-    answer(flyTrial({ path: { trial_id: trialId }, body: { speed }, headers: controlHeader(vehicle.id) })),
+export function useFlyTrial({ id, vehicle }: Campaign) {
+  return useTrialRequest(
+    ({ trialId, speed }: { trialId: number; speed: number | null }) =>
+      answer(flyTrial({ path: { trial_id: trialId }, body: { speed }, headers: controlHeader(vehicle.id) })),
+    { onError: useStaleCampaign(id) },
   );
 }
 
@@ -91,16 +100,19 @@ export function useCancelTrial() {
   return useTrialRequest((trialId: number) => answer(cancelTrial({ path: { trial_id: trialId } })));
 }
 
-export function useClassify({ id, version }: Trial) {
-  return useTrialRequest((review: Omit<Classification, "version">) =>
-    answer(classifyTrial({ path: { trial_id: id }, body: { version, ...review } })),
+export function useClassify({ id, version, campaign_id }: Trial) {
+  return useTrialRequest(
+    (review: Omit<Classification, "version">) =>
+      answer(classifyTrial({ path: { trial_id: id }, body: { version, ...review } })),
+    { onError: useStaleCampaign(campaign_id) },
   );
 }
 
 /** Why the operator aborted a flight. */
-export function useJudgeAbort({ id, version }: Trial) {
-  return useTrialRequest((cause: AbortJudgement["cause"]) =>
-    answer(judgeAbort({ path: { trial_id: id }, body: { version, cause } })),
+export function useJudgeAbort({ id, version, campaign_id }: Trial) {
+  return useTrialRequest(
+    (cause: AbortJudgement["cause"]) => answer(judgeAbort({ path: { trial_id: id }, body: { version, cause } })),
+    { onError: useStaleCampaign(campaign_id) },
   );
 }
 
@@ -117,16 +129,18 @@ export interface RecordOrder extends RecordFiles {
 
 /** Upload the record of a flight made elsewhere: of a planned trial, or with the trial to plan. */
 export function useUploadRecord(campaignId: number) {
-  return useTrialRequest(({ file, companion, trialId, plan = {}, ...query }: RecordOrder) =>
-    answer(
-      trialId === undefined
-        ? importFlight({
-            path: { campaign_id: campaignId },
-            query,
-            body: { file, companion, trial: JSON.stringify(plan) },
-          })
-        : uploadTrajectory({ path: { trial_id: trialId }, query, body: { file, companion } }),
-    ),
+  return useTrialRequest(
+    ({ file, companion, trialId, plan = {}, ...query }: RecordOrder) =>
+      answer(
+        trialId === undefined
+          ? importFlight({
+              path: { campaign_id: campaignId },
+              query,
+              body: { file, companion, trial: JSON.stringify(plan) },
+            })
+          : uploadTrajectory({ path: { trial_id: trialId }, query, body: { file, companion } }),
+      ),
+    { onError: useStaleCampaign(campaignId) },
   );
 }
 
@@ -135,7 +149,7 @@ export type RecordUpload = ReturnType<typeof useUploadRecord>;
 export function useRecompute(campaignId: number) {
   return useMutation({
     mutationFn: () => answer(computeProposal({ path: { campaign_id: campaignId } })),
-    onSuccess: useStaleCampaigns(),
+    onSuccess: useStaleCampaign(campaignId),
   });
 }
 
@@ -156,7 +170,9 @@ export function useDeleteCampaign({ id, version }: Campaign, onDeleted: () => vo
 
 /** Create the campaign that rehearses this one on a simulation. */
 export function useRehearse(campaignId: number) {
-  return useCampaignRequest(() => answer(rehearseCampaign({ path: { campaign_id: campaignId } })));
+  return useCampaignRequest(() => answer(rehearseCampaign({ path: { campaign_id: campaignId } })), {
+    onSettled: useStaleCampaign(campaignId),
+  });
 }
 
 /** Set the best gains as the safe gains of the campaign's registered vehicle. */
@@ -171,7 +187,9 @@ export function usePromote({ id, vehicle }: Campaign) {
 
 /** Continue a finished campaign for some flights, of which `plan` lists those that are planned at once, in order. */
 export function useReopen(campaignId: number) {
-  return useCampaignRequest((body: Reopening) => answer(reopenCampaign({ path: { campaign_id: campaignId }, body })));
+  return useCampaignRequest((body: Reopening) => answer(reopenCampaign({ path: { campaign_id: campaignId }, body })), {
+    onSettled: useStaleCampaign(campaignId),
+  });
 }
 
 export function useArchive(campaignId: number) {
@@ -184,7 +202,9 @@ export function useClone(campaignId: number) {
 }
 
 export function useRename(campaign: Campaign) {
-  return useCampaignRequest((name: string) =>
-    answer(editCampaign({ path: { campaign_id: campaign.id }, body: { version: campaign.version, name } })),
+  return useCampaignRequest(
+    (name: string) =>
+      answer(editCampaign({ path: { campaign_id: campaign.id }, body: { version: campaign.version, name } })),
+    { onError: useStaleCampaign(campaign.id) },
   );
 }

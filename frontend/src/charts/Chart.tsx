@@ -149,19 +149,21 @@ export function Chart({
     const target = element.current;
     if (target === null || plotly === null) return;
     // A page that was left resizes its charts to zero, when they may already be removed.
-    let here = true;
+    let latest = 0;
     const refit = async () => {
-      await plotly.Plots.resize(target);
+      latest += 1;
+      const own = latest;
+      await plotly.Plots.resize(target); // of several in a row Plotly does the last
       await enqueue(async () => {
         // Plotly leaves the legend where it stood beside the former margins.
-        if (here && drawn.current)
+        if (own === latest && drawn.current)
           await plotly.update(target, {}, legendFor(drawn.current.figure, target.clientWidth), []);
       });
     };
     const observer = new ResizeObserver(() => void (target.offsetParent !== null && refit()));
     observer.observe(target);
     return () => {
-      here = false;
+      latest = 0;
       observer.disconnect();
       plotly.purge(target);
     };

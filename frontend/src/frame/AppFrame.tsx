@@ -60,15 +60,16 @@ function CampaignVehicle({ campaignId }: { campaignId: number }) {
 function usePagesOpenAtTop(): void {
   const [pathname] = useLocation();
   const shown = useRef(pathname);
-  const wentBack = useRef(false);
-  useWindowEvent("popstate", () => {
-    wentBack.current = true;
+  const isByLink = useRef(false);
+  // Sent by wouter; when `popstate` is sent, the page before may already be shown.
+  useWindowEvent("pushState", () => {
+    isByLink.current = window.location.pathname !== shown.current;
   });
   useLayoutEffect(() => {
     if (pathname === shown.current) return;
     shown.current = pathname;
-    if (!wentBack.current && window.location.hash === "") window.scrollTo(0, 0);
-    wentBack.current = false;
+    if (isByLink.current && window.location.hash === "") window.scrollTo(0, 0);
+    isByLink.current = false;
   }, [pathname]);
 }
 

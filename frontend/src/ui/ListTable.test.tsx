@@ -18,18 +18,25 @@ const COLUMNS: Column<Flight>[] = [
 async function opened(rows: readonly Flight[], isKept?: (row: Flight) => boolean) {
   vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
   const page = document.createElement("div");
-  const table = (
-    <ListTable
-      label="Flights"
-      columns={COLUMNS}
-      rows={rows}
-      keyOf={({ number }) => String(number)}
-      what="flights"
-      isKept={isKept}
-    />
-  );
-  await act(() => createRoot(page).render(<MantineProvider defaultColorScheme="light">{table}</MantineProvider>));
+  const root = createRoot(page);
+  const show = (columns: Column<Flight>[]) =>
+    act(() =>
+      root.render(
+        <MantineProvider defaultColorScheme="light">
+          <ListTable
+            label="Flights"
+            columns={columns}
+            rows={rows}
+            keyOf={({ number }) => String(number)}
+            what="flights"
+            isKept={isKept}
+          />
+        </MantineProvider>,
+      ),
+    );
+  await show(COLUMNS);
   return {
+    show,
     shown: () => [...page.querySelectorAll("tbody tr > :first-child")].map(({ textContent }) => textContent),
     order: () => page.querySelector("thead th:last-child")?.getAttribute("aria-sort"),
     press: (text: string) =>
@@ -60,4 +67,12 @@ test("a long table shows its last rows, when sorted its first ones, and those th
   expect(shown().slice(-4)).toEqual(["49", "50", "202", "Show 200 further flights (202 hidden)"]);
   await press("Show 200");
   expect(shown().slice(-3)).toEqual(["249", "250", "Show 2 further flights (2 hidden)"]);
+});
+
+test("without the column that it was sorted by, a table is not sorted, and shows its last rows", async () => {
+  const rows = Array.from({ length: 60 }, (_, index) => ({ number: index + 1, error: index }));
+  const { show, shown, press } = await opened(rows);
+  await press("Error");
+  await show(COLUMNS.slice(0, 1));
+  expect([shown()[0], shown().at(-1)]).toEqual(["Show 10 earlier flights (10 hidden)", "60"]);
 });

@@ -89,7 +89,7 @@ export function ListTable<Row extends RowData>({
       sortUndefined: "last" as const,
     })),
   });
-  const isSorted = table.state.sorting.length > 0;
+  const isSorted = table.getAllLeafColumns().some((column) => column.getIsSorted());
   const all = table.getRowModel().rows.map(({ original }) => original);
   const hidden = what === undefined ? 0 : Math.max(0, all.length - count);
   const shown = all.filter((row, place) => (isSorted ? place < all.length - hidden : place >= hidden) || isKept?.(row));
