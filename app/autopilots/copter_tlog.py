@@ -37,7 +37,6 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
 from app.core.records.trajectory import Samples, Trajectory
 
-_READ_LATE: Final = "was changed after the flight, and was not read before"
 _STEPS_APART_S: Final = 1.0
 _SETTLED_S: Final = 6.5
 """Hover after the last step that is analysed."""
@@ -164,7 +163,7 @@ class _Reader:
             self._refused,
             ("LOCAL_POSITION_NED", none_found),
             self.autopilot.bounds,
-            lambda _: _READ_LATE,
+            lambda _: "was changed after the flight, and was not read before",
         )
         part = max((slice(*each) for each in parts), key=lambda each: float(np.ptp(target_m[each])))
         begin_s = float(time_s[part.start])

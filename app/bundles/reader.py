@@ -237,11 +237,9 @@ def _refuse(field: str, reason: str) -> NoReturn:
     raise refusal(Problem(field, reason))
 
 
-_UNCHANGED: Final = (
-    "Export the bundle again from the installation that has the campaign, and import that file unchanged."
-)
-
-
-def refusal(*problems: Problem, hint: str = _UNCHANGED) -> InputError:
+def refusal(
+    *problems: Problem,
+    hint: str = "Export the bundle again from the installation that has the campaign, and import that file unchanged.",
+) -> InputError:
     """Error of a bundle that cannot be imported."""
     return InputError("This bundle cannot be imported; nothing was stored.", problems=problems, hint=hint)

@@ -25,8 +25,6 @@ _CONNECT: Final = 0
 _SERVER_INFO: Final = 1
 _FRAME: Final = 7
 _TICKS_HZ: Final = 10_000_000
-_SYSTEM: Final = 1
-_COMPONENT: Final = 197
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +100,7 @@ class OdometryOutput:
 
     def __init__(self, address: StreamAddress) -> None:
         self._transport: Transport = open_transport(address.link)
-        self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
+        self._codec = COMMON.codec(system=1, component=197)
 
     def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         for sample in samples:

@@ -16,10 +16,6 @@ _FURTHER_OBSERVATIONS: Final = 3
 """Greatest number of further observations of a vehicle whose ground reference is set: one whose plan is just setting
 it, and was not heard from the beginning, must set it again."""
 _HEARD_WITHIN_S: Final = 5.0
-_LEFT: Final = (
-    "The process that flew it ended in flight. Land is repeated if it still flies as in a trial; otherwise it is only "
-    f"observed. If it does not descend, {HELP}."
-)
 
 
 class VehicleConnection(SafeGainsVehicle):
@@ -55,7 +51,10 @@ class VehicleConnection(SafeGainsVehicle):
         self._identify()
         self._was_flying = not self._identity.is_another
         if self._was_flying and not self._identity.missing_uid:
-            self._quarantine.requested = _LEFT
+            self._quarantine.requested = (
+                "The process that flew it ended in flight. Land is repeated if it still flies as in a trial; otherwise "
+                f"it is only observed. If it does not descend, {HELP}."
+            )
             self._repeated = RepeatedCommand(self._radio, Action.LAND, is_withheld=True)
 
     # ---- preflight checks

@@ -18,7 +18,6 @@ _AUTOPILOT: Final = 1
 _VERSION_ATTEMPTS: Final = 2
 _UID_ATTEMPTS: Final = 10
 """Attempts if the vehicle is known to report its hardware id: twice as many as for a parameter."""
-_NAME_ATTEMPTS: Final = 2
 
 
 class VehicleIdentity:
@@ -148,7 +147,7 @@ class VehicleIdentity:
         return problem
 
     def _has(self, parameter: str) -> bool:
-        return read_parameter(self._radio, parameter, attempts=_NAME_ATTEMPTS) is not None
+        return read_parameter(self._radio, parameter, attempts=2) is not None
 
 
 def _named(makes: frozenset[int]) -> str:

@@ -38,7 +38,6 @@ POSITIONS_HZ: Final = 40.0
 LOST_SHARE: Final = 0.2
 """Greatest share of the vehicle's positions that may be lost, whatever their rate."""
 SECONDARY_HZ: Final = 10.0
-_CHECKS_ATTEMPTS: Final = 2
 _NO_POSITION: Final = "Wait until it has a position (GPS, cameras or its own sensors), then check again."
 
 
@@ -226,7 +225,7 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
         radio.request(
             commands.command(radio.target, checks.command),
             lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
-            attempts=_CHECKS_ATTEMPTS,
+            attempts=2,
         )
     ready = radio.seen.may_arm
     if ready is None:
