@@ -10,7 +10,6 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 from fastapi import FastAPI
-from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
@@ -68,7 +67,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         responses=errors.RESPONSES,
-        generate_unique_id_function=_operation_id,
+        generate_unique_id_function=lambda route: route.name,  # so that generated clients have readable calls
     )
     app.state.settings = settings
     app.state.database = database
@@ -111,8 +110,3 @@ def _no_dashboard() -> None:
         "this installation",
         hint="In a checkout, `./dev up` builds and serves it. The API under /api works without it.",
     )
-
-
-def _operation_id(route: APIRoute) -> str:
-    """The function's name, so that generated clients have readable calls."""
-    return route.name

@@ -7,6 +7,7 @@ from app.autopilots import commands
 from app.autopilots.autopilot import AutopilotError
 from app.autopilots.measurements import Heartbeat, Version
 from app.autopilots.registry import AUTOPILOTS
+from app.core.formatting import capitalised
 from app.vehicles.base import Identity, VehicleError
 from app.vehicles.flight_end import FAILURE_TEXTS
 from app.vehicles.mavlink.failures import Failure
@@ -154,4 +155,4 @@ def _named(makes: frozenset[int]) -> str:
     """The autopilots with these MAV_AUTOPILOT."""
     titles = {profile.autopilot: profile.title for profile in AUTOPILOTS.values()}
     names = " and ".join(titles.get(make, f"another autopilot ({make})") for make in sorted(makes))
-    return names[:1].upper() + names[1:]
+    return capitalised(names)
