@@ -10,9 +10,8 @@ from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
-from app.figures.data import Curve
+from app.figures.data import Curve, thinned
 from app.figures.panels import Line, Panel, Plot, Style
-from app.figures.scale import thinned
 from app.log_analyses.schemas import (
     GainsInTakeoff,
     ParameterFile,
