@@ -7,7 +7,6 @@ gc.disable()
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Final
 
 from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
@@ -37,9 +36,6 @@ from app.web.origin import AccessMiddleware
 
 gc.freeze()
 gc.enable()
-
-COMPRESSION: Final = 5
-"""gzip level, of nine, for responses that are compressed for each request."""
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -94,7 +90,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     errors.install(app)
     app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes)
     app.add_middleware(AccessMiddleware)
-    app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=COMPRESSION)
+    app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=5)  # of nine: for each response anew
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():
         app.mount("/assets", Assets(directory=settings.ui_dir / "assets", check_dir=False))

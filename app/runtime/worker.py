@@ -179,7 +179,12 @@ class Worker:
             closing=self.closing,
         )
         sessions = VehicleConnectionManager(part, links=is_loopback(self.settings.host))
-        live = LiveServer(live_address(part.data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
+        live = LiveServer(
+            live_address(part.data_dir),
+            abort=sessions.abort,
+            order=sessions.order,
+            hello=lambda: WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids()),
+        )
         pool = FlightProcessPool(part.data_dir, part.clock)
         return sessions, FlightRunner(part, session=sessions.session, pool=pool), live
 
@@ -238,6 +243,3 @@ class Worker:
                 closing=self.closing,
                 clock=REAL_TIME,
             )
-
-    def _hello(self) -> WorkerHello:
-        return WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids())

@@ -43,13 +43,12 @@ _BIASED_ABOVE: Final = 0.2
 _FORGETTING: Final = 1000.0
 _VALID_BELOW: Final = 0.001
 _VALID_AFTER_S: Final = 2.0
-_LEAST_THRUST: Final = 0.05
 
 
 def estimator_settings(values: Mapping[str, float]) -> Samples:
     """Return the constants of `estimate_hover`, shape (5,), from parameters by the firmware's names."""
     low, highest = hover_limits(values["MPC_THR_HOVER"], values["HTE_THR_RANGE"])
-    lowest = max(low, _LEAST_THRUST)
+    lowest = max(low, 0.05)
     return np.array([values["HTE_HT_NOISE"], values["HTE_ACC_GATE"], lowest, highest, values["HTE_VZ_THR"]])
 
 

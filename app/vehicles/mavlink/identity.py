@@ -1,6 +1,6 @@
 """Identity of the vehicle that answers, and of the one that is expected."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots import commands
@@ -21,12 +21,12 @@ _UID_ATTEMPTS: Final = 10
 """Attempts if the vehicle is known to report its hardware id: twice as many as for a parameter."""
 
 
+@dataclass(slots=True)
 class VehicleIdentity:
     """Identity of the vehicle on a link beside the `pinned` one, which is known to a person; None before the first."""
 
-    def __init__(self, radio: AutopilotLink, pinned: Identity | None) -> None:
-        self._radio = radio
-        self.pinned = pinned
+    _radio: AutopilotLink
+    pinned: Identity | None
 
     @property
     def reported(self) -> Identity:
