@@ -7,10 +7,8 @@ gc.disable()
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Final
 
 from fastapi import FastAPI
-from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
@@ -39,9 +37,6 @@ from app.web.origin import AccessMiddleware
 gc.freeze()
 gc.enable()
 
-COMPRESSION: Final = 5
-"""gzip level, of nine, for responses that are compressed for each request."""
-
 
 def create_app(settings: Settings | None = None) -> FastAPI:
     """Create the application for the settings' database, which must be at the program's revision when it starts.
@@ -68,7 +63,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         responses=errors.RESPONSES,
-        generate_unique_id_function=_operation_id,
+        generate_unique_id_function=lambda route: route.name,  # so that generated clients have readable calls
     )
     app.state.settings = settings
     app.state.database = database
@@ -95,7 +90,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     errors.install(app)
     app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes)
     app.add_middleware(AccessMiddleware)
-    app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=COMPRESSION)
+    app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=5)  # of nine: for each response anew
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():
         app.mount("/assets", Assets(directory=settings.ui_dir / "assets", check_dir=False))
@@ -111,8 +106,3 @@ def _no_dashboard() -> None:
         "this installation",
         hint="In a checkout, `./dev up` builds and serves it. The API under /api works without it.",
     )
-
-
-def _operation_id(route: APIRoute) -> str:
-    """The function's name, so that generated clients have readable calls."""
-    return route.name

@@ -17,7 +17,6 @@ from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
 from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
-from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
     ParameterHistory,
@@ -37,7 +36,6 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
 from app.core.records.trajectory import Samples, Trajectory
 
-_READ_LATE: Final = "was changed after the flight, and was not read before"
 _STEPS_APART_S: Final = 1.0
 _SETTLED_S: Final = 6.5
 """Hover after the last step that is analysed."""
@@ -85,7 +83,7 @@ _IN_TAKEOFFS: Final = frozenset(
     {"TKOFF_SLEW_TIME", "TKOFF_THR_MAX", "MPC_TKO_RAMP_T", "COM_SPOOLUP_TIME", "MPC_LAND_SPEED"}
 )
 """Parameters that act in takeoffs and landings alone."""
-_MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, HOVER_RANGE_NAME})
+_MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, px4.HOVER_RANGE_NAME})
 """Parameters that some releases lack."""
 
 
@@ -164,7 +162,7 @@ class _Reader:
             self._refused,
             ("LOCAL_POSITION_NED", none_found),
             self.autopilot.bounds,
-            lambda _: _READ_LATE,
+            lambda _: "was changed after the flight, and was not read before",
         )
         part = max((slice(*each) for each in parts), key=lambda each: float(np.ptp(target_m[each])))
         begin_s = float(time_s[part.start])

@@ -33,7 +33,6 @@ MAX_JSON_BYTES: Final = 64 * 2**20
 MAX_VALUES: Final = 2_000_000
 """Maximum number of values in one JSON part: in memory each takes some hundred times the two bytes that it may have in
 the file."""
-MAX_PART_BYTES: Final = 256 * 2**20
 MAX_TOTAL_BYTES: Final = 4 * 2**30
 MAX_NUMBERS: Final = 20_000_000
 """Maximum count of numbers in one record: columns times samples."""
@@ -91,7 +90,7 @@ class Bundle:
         self._zip.close()
         self._unpacked.close()
 
-    def part(self, name: str, limit: int = MAX_PART_BYTES) -> bytes:
+    def part(self, name: str, limit: int = 256 * 2**20) -> bytes:
         """Data of a part. Raises InputError when it is missing, too large, or does not match the manifest."""
         if name not in self._places:
             data = self._listed(name, limit)
@@ -237,11 +236,9 @@ def _refuse(field: str, reason: str) -> NoReturn:
     raise refusal(Problem(field, reason))
 
 
-_UNCHANGED: Final = (
-    "Export the bundle again from the installation that has the campaign, and import that file unchanged."
-)
-
-
-def refusal(*problems: Problem, hint: str = _UNCHANGED) -> InputError:
+def refusal(
+    *problems: Problem,
+    hint: str = "Export the bundle again from the installation that has the campaign, and import that file unchanged.",
+) -> InputError:
     """Error of a bundle that cannot be imported."""
     return InputError("This bundle cannot be imported; nothing was stored.", problems=problems, hint=hint)

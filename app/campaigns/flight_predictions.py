@@ -22,8 +22,7 @@ from app.core.tuning.proposals import FlightPredictor, flight_predictor, modelle
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database
-from app.figures.data import Curve
-from app.figures.scale import thin_by_bends, thinned
+from app.figures.data import Curve, thin_by_bends, thinned
 
 CURVE_POINTS: Final = 500
 STORED_POINTS: Final = 1000

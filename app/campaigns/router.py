@@ -156,8 +156,6 @@ def predict_gains(
 
 figures_router = APIRouter(prefix="/api", tags=["figures"])
 
-FigureName = Literal["takeoffs", "errors", "gains"]
-
 
 @figures_router.get("/campaigns/{campaign_id}/figures/landscape")
 def get_landscape(
@@ -183,7 +181,7 @@ def get_landscape(
 def get_campaign_figure(
     session: Reader,
     campaign_id: Id,
-    name: FigureName,
+    name: Literal["takeoffs", "errors", "gains"],
     theme: Theme = "light",
     from_s: Annotated[float | None, Query(description="start of the displayed time range in seconds")] = None,
     to_s: Annotated[float | None, Query(description="end of the displayed time range in seconds")] = None,

@@ -102,10 +102,6 @@ class StopRule(Request):
     min_battery_v: Annotated[Number, Field(json_schema_extra={"exclusiveMinimum": 0})] | None = None
 
 
-def _recommended_strategy(definition: dict[str, object]) -> str:
-    return recommended_strategy(EXPERIMENTS.get(str(definition.get("experiment", ""))))
-
-
 class Definition(Request):
     """Everything besides the flights that a proposal depends on. Frozen at the first flight.
 
@@ -117,7 +113,7 @@ class Definition(Request):
     experiment: Key = "takeoff"
     experiment_options: dict[str, OptionValue] = Field(default_factory=dict)
     strategy: Annotated[Key, Field(description="by default the first of the catalogue for the experiment")] = Field(
-        default_factory=_recommended_strategy
+        default_factory=lambda given: recommended_strategy(EXPERIMENTS.get(str(given.get("experiment", ""))))
     )
     options: dict[str, OptionValue] = Field(default_factory=dict)
     start: Start = Field(default_factory=Start)

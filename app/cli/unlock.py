@@ -13,8 +13,6 @@ from app.common.settings import Settings
 from app.processes.locks import signature
 from app.web.addresses import AddressInfo, unlock_link
 
-_ANSWERS_WITHIN_S = 5.0
-
 
 class _System(BaseModel):
     """The fields of GET /api/system that are used here."""
@@ -48,7 +46,7 @@ def _running(settings: Settings) -> tuple[str, _System]:
     if found is None or not found.address:
         raise _not_running(settings)
     try:
-        answer = httpx2.get(f"{found.address}/api/system", timeout=_ANSWERS_WITHIN_S, trust_env=False)
+        answer = httpx2.get(f"{found.address}/api/system", timeout=5.0, trust_env=False)
         return found.address, _System.model_validate_json(answer.raise_for_status().content)
     except (httpx2.HTTPError, ValidationError) as error:
         raise _not_running(settings) from error

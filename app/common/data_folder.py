@@ -9,7 +9,6 @@ from typing import Final
 
 from app.common.errors import Problem, StorageError
 
-PRIVATE: Final = 0o700
 OTHERS: Final = 0o077
 
 
@@ -19,7 +18,7 @@ def prepare_data_dir(folder: Path) -> None:
     Raises StorageError that names the option when the folder cannot be used.
     """
     try:
-        folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, "this user cannot write there")
     except OSError as error:

@@ -19,7 +19,6 @@ from structlog.typing import Processor
 
 from app.common.data_folder import prepare_data_dir
 
-MAX_LOG_BYTES: Final = 5_000_000
 KEPT_LOGS: Final = 5
 
 _SHARED: Final[tuple[Processor, ...]] = (
@@ -39,7 +38,7 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -
     folder = data_dir / "log"
     prepare_data_dir(folder)
     to_file = logging.handlers.RotatingFileHandler(
-        folder / f"{role}.log", maxBytes=MAX_LOG_BYTES, backupCount=KEPT_LOGS, delay=True, encoding="utf-8"
+        folder / f"{role}.log", maxBytes=5_000_000, backupCount=KEPT_LOGS, delay=True, encoding="utf-8"
     )
     to_file.setFormatter(_formatter(structlog.processors.JSONRenderer()))
     to_stderr = logging.StreamHandler()

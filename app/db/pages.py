@@ -21,13 +21,11 @@ from app.db.base import Reported, UtcDateTime
 R = TypeVar("R", bound=Reported)
 V = TypeVar("V")
 
-_Id = Annotated[int, Field(gt=0, le=2**63 - 1)]
-
 
 @cache
 def _cursor_of(kind: Any) -> TypeAdapter[tuple[str, Any, int]]:
     """Reader of cursors of an order by values of this kind."""
-    return TypeAdapter(tuple[str, kind, _Id])
+    return TypeAdapter(tuple[str, kind, Annotated[int, Field(gt=0, le=2**63 - 1)]])
 
 
 @dataclass(frozen=True, slots=True)

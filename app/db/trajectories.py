@@ -26,7 +26,6 @@ from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
 
 VERSION: Final = 1
-_LEVEL: Final = 3
 _TIME: Final = "time_s"
 _WIDTH: Final = 4
 
@@ -52,7 +51,7 @@ def pack(trajectory: Trajectory) -> TrajectoryRow:
         source=trajectory.source,
         clock=trajectory.clock,
         checksum=_checksum(columns, plain),
-        data=zstandard.ZstdCompressor(level=_LEVEL).compress(planes.tobytes()),
+        data=zstandard.ZstdCompressor(level=3).compress(planes.tobytes()),
     )
 
 

@@ -14,7 +14,6 @@ from app.figures.data import Curve, History
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 Cell = str | int | float | None
-PlotlyJson = Mapping[str, object]
 Trace = dict[str, object]
 
 CHECKED_ITEMS: Final = 20
@@ -58,7 +57,7 @@ class Card:
     state: Literal["ready", "waiting", "failed"]
     summary: str = ""
     reason: str = ""
-    figure: PlotlyJson | None = None
+    figure: Mapping[str, object] | None = None
     table: Table | None = None
 
 

@@ -8,9 +8,8 @@ import numpy as np
 from app.core.formatting import short
 from app.figures import theme
 from app.figures.base import Card, Figure, Table, Trace, literal, reading, scatter, table_of_curves
-from app.figures.data import Curve, Scored
+from app.figures.data import Curve, Scored, span_around, thin_by_bends, thinned
 from app.figures.overlays import off_scale
-from app.figures.scale import span_around, thin_by_bends, thinned
 
 POINTS: Final = 600
 TABLE_ROWS: Final = 34

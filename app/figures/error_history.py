@@ -8,9 +8,8 @@ from typing import Any, Final
 from app.core import formatting
 from app.figures import theme
 from app.figures.base import CampaignFigure, Card, Cell, Column, Table, Trace, scatter
-from app.figures.data import AnyFlight, Range
+from app.figures.data import AnyFlight, Range, robust_top
 from app.figures.overlays import MANY, off_scale_traces
-from app.figures.scale import robust_top
 
 FEW: Final = 8
 """Up to this number of flights, every error is labelled."""

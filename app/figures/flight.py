@@ -11,10 +11,9 @@ import numpy as np
 from app.core.records.flight_events import FlightEvent
 from app.figures import theme
 from app.figures.base import Card, Figure, Table, Trace, literal, scatter, table_of_curves
-from app.figures.data import NO_CURVE, Band, Curve, Range, Scored
+from app.figures.data import NO_CURVE, Band, Curve, Range, Scored, robust_span, thin_by_bends, thinned
 from app.figures.deviations import deviation_axis, deviation_of, is_step, scored_deviation_limit, scored_part
 from app.figures.overlays import band_traces, glitch_traces
-from app.figures.scale import robust_span, thin_by_bends, thinned
 
 POINTS: Final = 1200
 TABLE_ROWS: Final = 34

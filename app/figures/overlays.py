@@ -11,8 +11,7 @@ import numpy as np
 from app.core.records.trajectory import Samples
 from app.figures import theme
 from app.figures.base import Trace, reading, scatter
-from app.figures.data import NO_CURVE, Band, Curve, FlightData, History, Range
-from app.figures.scale import Points, thin_by_bends, thinned
+from app.figures.data import NO_CURVE, Band, Curve, FlightData, History, Points, Range, thin_by_bends, thinned
 
 GLITCH_POINTS: Final = 60
 Side = Literal["left", "center", "right"]

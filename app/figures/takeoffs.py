@@ -10,7 +10,7 @@ from typing import Any, Final, cast
 from app.core.formatting import count, short
 from app.figures import theme
 from app.figures.base import CampaignFigure, Card, NamedCurve, Table, Trace, reading, scatter, table_of_curves
-from app.figures.data import Curve, FlightData, Range
+from app.figures.data import Curve, FlightData, Range, RobustSpan, span_around, thin_by_bends, thinned
 from app.figures.deviations import (
     changes_of,
     deviation_axis,
@@ -30,7 +30,6 @@ from app.figures.overlays import (
     part_off_scale,
     select_individual_flights,
 )
-from app.figures.scale import RobustSpan, span_around, thin_by_bends, thinned
 
 SHARED_LEGEND: Final = {"earlier": "Earlier", "invalid": "Not counted"}
 """Standings whose flights look alike and share a legend entry."""

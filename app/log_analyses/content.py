@@ -25,7 +25,6 @@ ANALYSED: Final = (
     "ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or .tlog log "
     "of a takeoff"
 )
-_TRACES: Final = "or a trace of the vertical loop with one row per step, .csv or .csv.gz"
 _OTHER_FILES: Final[Mapping[Format | None, str]] = {
     Format.GZIP: "is compressed (gzip): unpack it first",
     Format.ZIP: "is an archive (zip): unpack it first",
@@ -40,7 +39,7 @@ def _decoded(content: bytes, companion: bytes | None, name: str) -> tuple[Reader
     reader = reader_of(head)
     if reader is None:
         what = _OTHER_FILES.get(recognise(head), "is not a log") if head else "is empty"
-        hint = f"Use {ANALYSED}, {_TRACES}."
+        hint = f"Use {ANALYSED}, or a trace of the vertical loop with one row per step, .csv or .csv.gz."
         raise TrajectoryError(f"{name} cannot be used.", hint=hint, problems=(Problem("file", what),))
     return reader, reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
 

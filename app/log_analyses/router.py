@@ -10,7 +10,6 @@ from app.log_analyses import service
 from app.log_analyses.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
-VehicleId = Annotated[int | None, Query(ge=1, le=2**63 - 1)]
 FlownGains = Annotated[str, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")]
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 
@@ -34,7 +33,9 @@ def get_example_analysis() -> LogAnalysis:
 
 
 @router.post("/campaign", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
-def start_campaign(record: Record, asking: RequestContextDep, vehicle: VehicleId = None) -> Campaign:
+def start_campaign(
+    record: Record, asking: RequestContextDep, vehicle: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None
+) -> Campaign:
     """Create the campaign of a log.
 
     From a Paparazzi log: of a vehicle that is flown elsewhere, with the takeoffs as its first flights. From a log of an

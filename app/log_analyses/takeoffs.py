@@ -10,9 +10,8 @@ from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
-from app.figures.data import Curve
+from app.figures.data import Curve, thinned
 from app.figures.panels import Line, Panel, Plot, Style
-from app.figures.scale import thinned
 from app.log_analyses.schemas import (
     GainsInTakeoff,
     ParameterFile,
@@ -24,7 +23,6 @@ from app.log_analyses.schemas import (
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""
 _SHOWN_S: Final = 8.0
-_SHOWN_M: Final = (-0.25, 0.25)
 _POINTS: Final = 1500
 
 
@@ -85,7 +83,7 @@ def plot_of(analysis: TakeoffAnalysis) -> Plot:
         x_title="Time since the command (s)",
         panels=(
             Panel(y_title="Altitude (m)", digits=2, lines=(goal, *lines(0.0))),
-            Panel(y_title="Deviation (m)", digits=3, y_range=_SHOWN_M, lines=lines(goal_m)),
+            Panel(y_title="Deviation (m)", digits=3, y_range=(-0.25, 0.25), lines=lines(goal_m)),
         ),
         x_range=(0.0, min(_SHOWN_S, analysis.window_s)),
     )

@@ -6,6 +6,7 @@ further columns, known channels are kept and others ignored. Gaps are read witho
 them.
 """
 
+import codecs
 import csv
 import io
 import math
@@ -27,8 +28,6 @@ _REQUIRED: Final = ("time_s", "altitude_m")
 _MISSING: Final = ("", "nan")
 _MAX_LINE_BYTES: Final = 4096
 _LARGEST: Final = 1e6
-_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
-_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 
 _FORMAT_HINT: Final = (
     "Save the flight as CSV in UTF-8 with the header time_s,altitude_m, commas between values and "
@@ -85,9 +84,9 @@ def _lines(stream: BinaryIO) -> Iterator[str]:
                 field=where,
             )
         if number == 1:
-            if raw.startswith(_UTF_16):
+            if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
                 raise refused("is text in UTF-16, not UTF-8", _FORMAT_HINT, field=where)
-            raw = raw.removeprefix(_BYTE_ORDER_MARK)
+            raw = raw.removeprefix(codecs.BOM_UTF8)
         if b"\0" in raw:
             raise refused("contains bytes that are not text", _FORMAT_HINT, field=where)
         if len(raw) > _MAX_LINE_BYTES:

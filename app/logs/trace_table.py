@@ -26,7 +26,6 @@ from app.logs.formats import head_of
 MAX_ROWS: Final = 1_000_000
 MAX_BYTES: Final = 256 * 2**20
 _GZIP: Final = b"\x1f\x8b"
-_IN_MEMORY_BYTES: Final = 2**22
 _DESCRIPTION_CHARACTERS: Final = 2**16
 _GZIP_WINDOW: Final = 31
 _FIRST_ROW: Final = 3
@@ -115,7 +114,7 @@ def text_of(checks: TraceChecks, stream: BinaryIO) -> Iterator[io.TextIOWrapper]
     Raises InputError, also while it is read, if it is damaged."""
     source = gzip.GzipFile(fileobj=stream, mode="rb") if head_of(stream).startswith(_GZIP) else stream
     try:
-        with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as plain:
+        with tempfile.SpooledTemporaryFile(max_size=2**22) as plain:
             while chunk := source.read(2**20):
                 plain.write(chunk)
                 if plain.tell() > MAX_BYTES:

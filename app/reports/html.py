@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
-_BUNDLE: Final = "report/plotly-cartesian.min.js"
 _OUTCOMES: Final = {
     "converged": "Converged",
     "budget": "Flight budget used",
@@ -86,7 +85,7 @@ def render(report: Report, plotly: str) -> Document:
 @lru_cache(maxsize=2)
 def chart_library(ui_dir: Path) -> str:
     """Source of the chart library: the one of the built dashboard, or else the larger one of the plotly package."""
-    shipped = ui_dir / _BUNDLE
+    shipped = ui_dir / "report/plotly-cartesian.min.js"
     if shipped.is_file():
         return shipped.read_text(encoding="utf-8")
     from plotly.offline import get_plotlyjs  # five megabytes, needed only without a dashboard

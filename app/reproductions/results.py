@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from app.core.records.trajectory import Samples
-from app.figures.data import Curve
+from app.figures.data import Curve, thinned
 from app.figures.panels import Line, Plot, Style
-from app.figures.scale import thinned
 
 Progress = Callable[[float, str], None]
 """Called with the share done, 0 … 1, and the current activity."""

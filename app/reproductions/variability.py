@@ -23,9 +23,7 @@ from app.vehicles.registry import check_options
 from app.vehicles.simulated import simulate_flight, trajectory_of
 from app.vehicles.twin import TwinFlight
 
-GROUPS: Final = 200
 REPEATS: Final = 10
-FADING_GROUPS: Final = 40
 FADE: Final = 0.005
 """Loss of thrust of the control experiment's battery from the first to the last flight, as a share."""
 CONFIDENCE: Final = 0.9
@@ -60,7 +58,7 @@ class Repeats:
     overruled: str
 
 
-def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_groups: int = FADING_GROUPS) -> Result:
+def run_variability(on_progress: Progress, *, groups: int = 200, fading_groups: int = 40) -> Result:
     """Fly both policies on `groups` batteries of ten flights each; `groups` and `fading_groups` ≥ 1."""
     tell = counted(on_progress, len(POLICIES) * (groups + fading_groups))
     found = [_fly(policy, groups, fading_groups, tell) for policy in POLICIES]

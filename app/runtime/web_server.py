@@ -26,7 +26,6 @@ from app.main import create_app
 from app.runtime.http_connections import Connections, LimitedProtocol, room_for_connections
 from app.web.addresses import addresses_elsewhere, qr_text, unlock_link, web_address
 
-STREAMS_END_WITHIN_S: Final = 3
 TICKS_A_SECOND: Final = 10
 WITHOUT_DESCRIPTORS_S: Final = 0.05
 NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
@@ -141,7 +140,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         log_config=None,
         access_log=False,
         server_header=False,
-        timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
+        timeout_graceful_shutdown=3,
     )
     _Server(config, listener, connections, ready=ready, closing=closing).run()
 

@@ -53,7 +53,6 @@ ACTS_AT_ONCE: Final = 8
 SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
 REPRODUCTIONS_AT_ONCE: Final = 1
 LANDSCAPES_AT_ONCE: Final = 1
-LANDSCAPE_NICENESS: Final = 5
 LOOK_ANYWAY_S: Final = 1.0
 SWITCH_EVERY_S: Final = 0.001
 """Maximum time for which a thread that writes to the database keeps the one that forwards aborts waiting for the
@@ -156,9 +155,7 @@ class Worker:
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
             pool = stack.enter_context(ComputePool(SPARE_PROCESSORS, prepare=warm_up))
-            landscape_pool = stack.enter_context(
-                ComputePool(LANDSCAPES_AT_ONCE, prepare=warm_up, niceness=LANDSCAPE_NICENESS)
-            )
+            landscape_pool = stack.enter_context(ComputePool(LANDSCAPES_AT_ONCE, prepare=warm_up, niceness=5))
             job_runners = self._build_job_runners(database, pool, landscape_pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self.end, "the worker failed; see its log")
@@ -182,7 +179,12 @@ class Worker:
             closing=self.closing,
         )
         sessions = VehicleConnectionManager(part, links=is_loopback(self.settings.host))
-        live = LiveServer(live_address(part.data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
+        live = LiveServer(
+            live_address(part.data_dir),
+            abort=sessions.abort,
+            order=sessions.order,
+            hello=lambda: WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids()),
+        )
         pool = FlightProcessPool(part.data_dir, part.clock)
         return sessions, FlightRunner(part, session=sessions.session, pool=pool), live
 
@@ -241,6 +243,3 @@ class Worker:
                 closing=self.closing,
                 clock=REAL_TIME,
             )
-
-    def _hello(self) -> WorkerHello:
-        return WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids())

@@ -19,14 +19,11 @@ LATENCY_S: Final = 0.02
 DRIFT_M_S: Final = 0.1
 
 Version = tuple[int, int, int, int]
-NAT_NET: Final[Version] = (4, 1, 0, 0)
 
 _CONNECT: Final = 0
 _SERVER_INFO: Final = 1
 _FRAME: Final = 7
 _TICKS_HZ: Final = 10_000_000
-_SYSTEM: Final = 1
-_COMPONENT: Final = 197
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +99,7 @@ class OdometryOutput:
 
     def __init__(self, address: StreamAddress) -> None:
         self._transport: Transport = open_transport(address.link)
-        self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
+        self._codec = COMMON.codec(system=1, component=197)
 
     def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         for sample in samples:
@@ -116,7 +113,7 @@ class OdometryOutput:
 class NatNetServer:
     """Simulated Motive: replies to connection requests, and streams one rigid body in NatNet 4.1."""
 
-    def __init__(self, address: NatNetAddress, version: Version = NAT_NET) -> None:
+    def __init__(self, address: NatNetAddress, version: Version = (4, 1, 0, 0)) -> None:
         """Open the server; `version` is the protocol version that it reports. Raises LinkError if the port is in
         use."""
         self._address, self._version = address, version

@@ -149,7 +149,6 @@ _RESTORED: Final = "It landed the vehicle and restored the safe gains."
 _RESTORED_ON_GROUND: Final = (
     "It restored the safe gains before the takeoff. Request the flight again if it is still needed."
 )
-_BEFORE_LIFT_OFF: Final = "before lift-off"
 
 
 def joined(*parts: str) -> str:
@@ -195,7 +194,7 @@ def end_text(end: FlightEnd | None) -> str:
     """The cause, and that a vehicle had not left the ground; empty without an end."""
     if end is None or end.landed is not Landing.STAYED or end.failure is None:
         return "" if end is None else cause_text(end)
-    request, on_ground = end.request, f"{'aborted' if end.request else 'ended'} {_BEFORE_LIFT_OFF}"
+    request, on_ground = end.request, f"{'aborted' if end.request else 'ended'} before lift-off"
     if request is not None and (request.by is Requester.PROGRAM_STOPPED or not is_worded(request)):
         return cause_text(end, on_ground)
     return f"{on_ground}: {cause_text(end)}"

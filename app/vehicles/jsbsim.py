@@ -37,7 +37,6 @@ _GROUND_STEPS: Final = 4
 at the loop's step JSBSim's integration of them oscillates."""
 _CLEAR_OF_GROUND_M: Final = 0.02
 _SETTLING_STEPS: Final = 200
-_GUST_CORRELATION_S: Final = 1.0
 _FULL_BATTERY_V: Final = 11.1
 
 
@@ -74,9 +73,7 @@ class JsbsimFlight:
         self._noise_m = noise.normal(0.0, options["altitude_noise_m"], MAX_STEPS)
         self._gusts_ft_s = (
             [
-                gusts(
-                    direction, MAX_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=_GUST_CORRELATION_S
-                ).tolist()
+                gusts(direction, MAX_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=1.0).tolist()
                 for direction in directions
             ]
             if options["gust_m_s"] > 0.0

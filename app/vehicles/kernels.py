@@ -39,14 +39,7 @@ from app.core.models.vertical import (
 Rows = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-ALTITUDE: Final = 0
-CLIMB_RATE: Final = 1
-SET_POINT: Final = 2
-REFERENCE: Final = 3
-THRUST: Final = 4
-FEED_FORWARD: Final = 5
-FEEDBACK: Final = 6
-BATTERY: Final = 7
+ALTITUDE, CLIMB_RATE, SET_POINT, REFERENCE, THRUST, FEED_FORWARD, FEEDBACK, BATTERY = range(8)
 CHANNELS: Final = (
     "altitude_m",
     "climb_rate_m_s",
@@ -65,12 +58,7 @@ AUTOPILOT_SIZE: Final = STATE_SIZE + 2
 """The autopilot's memory: the loop's state, whether the loop was entered, and the thrust command of the previous
 step."""
 
-MODE: Final = 0
-TARGET: Final = 1
-KP: Final = 2
-KI: Final = 3
-KD: Final = 4
-COMMAND_SIZE: Final = 5
+MODE, TARGET, KP, KI, KD, COMMAND_SIZE = range(6)
 
 
 @kernel

@@ -23,7 +23,6 @@ _THRUST_SD: Final = 0.003
 _START_SD_S: Final = 0.060
 _DATUM_SD_M: Final = 0.004
 _GUST_SD_M_S2: Final = 0.05
-_GUST_CORRELATION_S: Final = 0.5
 _BATTERY_V: Final = 11.1
 
 
@@ -43,7 +42,7 @@ class TwinFlight:
         self._hover_force = _hover_force(options) / (1.0 + _THRUST_SD * thrust)
         self._ground_effect_height_m = options["ground_effect_height_m"]
         self._datum_m = float(_DATUM_SD_M * datum)
-        self._gusts = gusts(gust, MAX_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=_GUST_CORRELATION_S)
+        self._gusts = gusts(gust, MAX_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=0.5)
         self._resting = round(max(options["start_latency_s"] + _START_SD_S * start, 0.0) * RATE_HZ)
         self.autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
         self._plant = np.zeros(3)

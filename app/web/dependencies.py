@@ -152,9 +152,6 @@ async def json_only(request: Request) -> None:
 Theme = Annotated[ThemeName, Query(description="colours for a light or a dark page")]
 
 
-_IN_MEMORY_BYTES: Final = 2**20
-_CHUNK_BYTES: Final = 2**18
-_DOWNLOAD_CHUNK_BYTES: Final = 2**20
 _CSV: Final = "text/csv"
 _ANY: Final = "application/octet-stream"
 
@@ -246,7 +243,7 @@ async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyK
 @asynccontextmanager
 async def _raw(request: Request) -> AsyncIterator[_Received]:
     digest = hashlib.sha256()
-    with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as spool:
+    with tempfile.SpooledTemporaryFile(max_size=2**20) as spool:
         async for chunk in request.stream():
             digest.update(chunk)
             await run_in_threadpool(spool.write, chunk)
@@ -265,7 +262,7 @@ async def _form(request: Request) -> AsyncIterator[_Received]:
                 problems=(Problem("file", "is missing"),),
             )
         for each in (part, companion):
-            while each is not None and (chunk := await each.read(_CHUNK_BYTES)):
+            while each is not None and (chunk := await each.read(2**18)):
                 digest.update(chunk)
         fields = {name: value for name, value in form.items() if isinstance(value, str)}
         digest.update(json.dumps(fields, sort_keys=True).encode())
@@ -308,5 +305,5 @@ def download(file: IO[bytes], name: str, *, media_type: str) -> StreamingRespons
 
 def _chunks(file: IO[bytes]) -> Iterator[bytes]:
     with file:
-        while chunk := file.read(_DOWNLOAD_CHUNK_BYTES):
+        while chunk := file.read(2**20):
             yield chunk

@@ -6,6 +6,7 @@ import errno
 import json
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from http import HTTPStatus
 from typing import Any, Final, get_args
 
@@ -85,6 +86,7 @@ def install(app: FastAPI) -> None:
     """Answer every error of the application with problem details, and add their schema to its OpenAPI document."""
     plain = app.openapi
 
+    @cache
     def complete() -> dict[str, Any]:
         document = plain()
         problem = ProblemDetails.model_json_schema(ref_template=REF_TEMPLATE)

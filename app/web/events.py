@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from datetime import timedelta
-from typing import Annotated, Final
+from typing import Annotated
 
 from fastapi import APIRouter, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
@@ -17,9 +17,6 @@ from app.live.hub import LinkState, LiveItem, changes_after
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.web.dependencies import CurrentDatabase, Live
 
-RETRY_MS: Final = 1000
-MAX_SINCE_S: Final = 60.0
-
 router = APIRouter(prefix="/api", tags=["events"])
 
 
@@ -30,7 +27,7 @@ async def events(
     last_event_id: Annotated[str | None, Header()] = None,
     since_s: Annotated[
         float,
-        Query(ge=0.0, le=MAX_SINCE_S, description="length in seconds of the recent past whose changes are sent first"),
+        Query(ge=0.0, le=60.0, description="length in seconds of the recent past whose changes are sent first"),
     ] = 0.0,
 ) -> AsyncIterator[ServerSentEvent]:
     """Stream all events.
@@ -48,7 +45,7 @@ async def events(
         yield ServerSentEvent(
             event="hello",
             id=None if last_event_id else str(sent),
-            retry=RETRY_MS,
+            retry=1000,
             data={"version": __version__, "worker": live.client.answers},
         )
         if not known:

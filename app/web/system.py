@@ -97,7 +97,6 @@ def _addresses(request: Request, settings: CurrentSettings) -> list[AddressInfo]
     return addresses_elsewhere(settings.host, port)
 
 
-_COOKIE_KEPT_S: Final = 90 * 24 * 3600
 _UNLOCK_HEADERS: Final = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
 """The token is in the address: these headers keep it out of caches and from the next page."""
 
@@ -162,5 +161,5 @@ def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") 
             return RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)
         return HTMLResponse(_SPENT, 403, headers=_UNLOCK_HEADERS)
     answer = RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)
-    answer.set_cookie(keyring.cookie, keyring.value(given), max_age=_COOKIE_KEPT_S, httponly=True, samesite="strict")
+    answer.set_cookie(keyring.cookie, keyring.value(given), max_age=90 * 24 * 3600, httponly=True, samesite="strict")
     return answer

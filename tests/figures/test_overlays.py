@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.figures.data import Curve, FlightData, Range
+from app.figures.data import Curve, FlightData, Range, thinned
 from app.figures.error_history import ErrorsFigure
 from app.figures.gains import GainsFigure
 from app.figures.overlays import MANY, MAX_INDIVIDUAL_FLIGHTS, envelope_of, select_individual_flights
-from app.figures.scale import thinned
 from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import TIME_S, climb, flight, history, trace, traces
 

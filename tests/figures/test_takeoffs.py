@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.figures.data import Curve, FlightData, NextFlight, Noise, Range
-from app.figures.scale import robust_top, thinned
+from app.figures.data import Curve, FlightData, NextFlight, Noise, Range, robust_top, thinned
 from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, layout, proposal, trace, traces
 

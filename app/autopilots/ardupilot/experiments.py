@@ -65,11 +65,6 @@ an integral gain of the acceleration the firmware does not arm, and a wrong hove
 _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
 _LARGEST_MISFIT_M: Final = 0.1
-_RANGES: Final = {
-    **dict.fromkeys(DEFAULTS, PLAUSIBLE),
-    LOOP_RATE: LOOP_RATES_HZ,
-    ACCELEROMETER_FILTER: (0.0, LOOP_RATES_HZ[1]),
-}
 _DYNAMIC: Final = [
     vertical.THROTTLE,
     vertical.THROTTLE_FILTERED,
@@ -239,7 +234,14 @@ def ardupilot_loop(parameters: Mapping[str, float]) -> ArduPilotLoop:
     Raises InputError for one that the replica lacks, or that is outside its range.
     """
     given = dict(in_older_names(*each) for each in parameters.items())
-    require_within(given, _RANGES)
+    require_within(
+        given,
+        {
+            **dict.fromkeys(DEFAULTS, PLAUSIBLE),
+            LOOP_RATE: LOOP_RATES_HZ,
+            ACCELEROMETER_FILTER: (0.0, LOOP_RATES_HZ[1]),
+        },
+    )
     step_s = 1.0 / given.get(LOOP_RATE, LOOP_RATE_HZ)
     return ArduPilotLoop(
         parameters=parameters_from(given),

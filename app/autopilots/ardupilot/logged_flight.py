@@ -43,7 +43,6 @@ _LARGEST_ACCELERATION_M_S2: Final = 50.0
 _LEARNED: Final = "MOT_THST_HOVER"
 _THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX")
 _USED: Final = frozenset({*LOOP_NAMES, *_THRUST_CURVE} - {_LEARNED})
-_HINT: Final = "Use ArduCopter's .bin log of a flight with altitude changes, with NTUN and CTUN in LOG_BITMASK."
 
 
 def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
@@ -51,7 +50,10 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.
     """
-    refused = refusal(f"{name} cannot be analysed.", _HINT)
+    refused = refusal(
+        f"{name} cannot be analysed.",
+        "Use ArduCopter's .bin log of a flight with altitude changes, with NTUN and CTUN in LOG_BITMASK.",
+    )
     _require_messages(recording, refused)
     time_s = recording.columns["altitude_m"].time_s
     lean, throttle = _lean(recording, time_s), [recording.columns[each].beside(time_s) for each in _TUNING]

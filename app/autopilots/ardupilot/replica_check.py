@@ -58,7 +58,6 @@ _GUIDED: Final = 4
 _LIMITED: Final = 1
 _OPTIONS: Final = "GUID_OPTIONS"
 _WAYPOINT_NAVIGATION: Final = 1 << 6
-_HINT: Final = "Give ArduCopter's .bin log of a flight in GUIDED, recorded with NTUN, CTUN and PID in LOG_BITMASK."
 _SAME_LOOP_S: Final = 0.0012
 
 COLUMNS: Final = ("t_s", *INPUTS, *OUTPUTS)
@@ -144,7 +143,11 @@ def ardupilot_loop_log(recording: Recording, *, name: str) -> LoopLog:
 
     Raises InputError if there are none, or naming the message or parameter that is missing or not supported.
     """
-    refused = refusal(f"{name} cannot be compared with the replica.", _HINT, error=InputError)
+    refused = refusal(
+        f"{name} cannot be compared with the replica.",
+        "Give ArduCopter's .bin log of a flight in GUIDED, recorded with NTUN, CTUN and PID in LOG_BITMASK.",
+        error=InputError,
+    )
     columns = recording.columns
     if not columns.keys() >= set(_MOTION) or columns["altitude_m"].source != "PSCD.PD":
         raise refused("PSCD", "is missing: the log does not contain the vertical loop")

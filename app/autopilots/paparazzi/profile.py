@@ -139,19 +139,6 @@ def _version(message: Message) -> Version | None:
     return Version(f"{packed // 10000}.{packed // 100 % 100}.{packed % 100}") if packed else None
 
 
-_READERS: Final[mavlink.Readers] = {
-    **mavlink.READERS,
-    "HEARTBEAT": _heartbeat,
-    "MISSION_ACK": lambda message: CommandReply(
-        "waypoint", number(message, "type") == 0, f"result {number(message, 'type'):.0f}"
-    ),
-    "SCRIPT_COUNT": lambda message: BlockCount(int(number(message, "count"))),
-    "SCRIPT_ITEM": lambda message: Block(int(number(message, "seq")), text(message, "name")),
-    "SCRIPT_CURRENT": lambda message: BlockEntered(int(number(message, "seq"))),
-    "AUTOPILOT_VERSION": _version,
-}
-
-
 PAPARAZZI: Final = Autopilot(
     name="paparazzi",
     title="Paparazzi",
@@ -191,7 +178,17 @@ PAPARAZZI: Final = Autopilot(
     logs_own_names=True,
     parameter_component=_ALL_COMPONENTS,
     stop_settings=_STOP_SETTINGS,
-    readers=_READERS,
+    readers={
+        **mavlink.READERS,
+        "HEARTBEAT": _heartbeat,
+        "MISSION_ACK": lambda message: CommandReply(
+            "waypoint", number(message, "type") == 0, f"result {number(message, 'type'):.0f}"
+        ),
+        "SCRIPT_COUNT": lambda message: BlockCount(int(number(message, "count"))),
+        "SCRIPT_ITEM": lambda message: Block(int(number(message, "seq")), text(message, "name")),
+        "SCRIPT_CURRENT": lambda message: BlockEntered(int(number(message, "seq"))),
+        "AUTOPILOT_VERSION": _version,
+    },
     reports_version=False,
     steps=_steps,
     holds_first=False,

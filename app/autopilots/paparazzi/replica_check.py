@@ -68,9 +68,7 @@ _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
 )
 _TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 _BEYOND: Final = f"beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty"
-_STEP_APART: Final = "compared bit for bit; fields may be one step of 1/512 s apart"
 _DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 m."
-_HINT: Final = "Give the .data file of Paparazzi's ground log, with VERT_LOOP in it."
 
 
 def read_loop_trace(path: Path) -> LoopTrace:
@@ -126,7 +124,11 @@ def _check_log(recording: Recording, name: str, given: str) -> ReplicaCheck:
     VERT_LOOP, or the gains cannot be determined.
     """
     if not isinstance(recording, PaparazziRecording) or recording.loop is None:
-        refused = refusal(f"{name} cannot be compared with the replica.", _HINT, error=InputError)
+        refused = refusal(
+            f"{name} cannot be compared with the replica.",
+            "Give the .data file of Paparazzi's ground log, with VERT_LOOP in it.",
+            error=InputError,
+        )
         raise refused("file", "contains no VERT_LOOP, the loop's inputs and commands")
     computed = recording.flown
     flown = [FlownGains(0.0, _parsed(given))] if given else computed
@@ -186,7 +188,12 @@ def _simulated(simulation: SimulationCheck) -> Iterable[SignalResult]:
 def _commanded(drawn: Overlay) -> Iterable[SignalResult]:
     for name in COMMANDS:
         largest = float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0))
-        yield signal_result(name, replace(_SIGNALS[name], allowance=_STEP_APART), drawn, largest_difference=largest)
+        yield signal_result(
+            name,
+            replace(_SIGNALS[name], allowance="compared bit for bit; fields may be one step of 1/512 s apart"),
+            drawn,
+            largest_difference=largest,
+        )
 
 
 def _check_trace(stream: BinaryIO, name: str) -> ReplicaCheck:

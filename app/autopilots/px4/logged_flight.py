@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
-from app.autopilots.px4.replica.hover_range import hover_deviation
-from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, parameters_from
+from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
 from app.autopilots.recording import LONGEST_INTERVAL_S, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (
@@ -44,10 +43,6 @@ _SET_POINT_LASTS_S: Final = 1.0
 _NEAR_LIMIT: Final = 1e-3
 _LEAST_SHARE: Final = 0.2
 """Of hover thrust: below it, the assumed hover thrust cannot be told from thrust and acceleration."""
-_HINT: Final = (
-    "Use PX4's .ulg log of a flight with altitude changes in Hold, Mission or Offboard mode, with bit 0 of "
-    "SDLOG_PROFILE set, its default. Takeoffs are left out: their ramp decides, not the gains."
-)
 
 
 def px4_flight(recording: Recording, name: str) -> LoggedFlight:
@@ -55,7 +50,12 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the topic or parameter that is missing, or InputError for one not supported.
     """
-    refused = refusal(f"{name} cannot be analysed.", _HINT, recording.notes)
+    refused = refusal(
+        f"{name} cannot be analysed.",
+        "Use PX4's .ulg log of a flight with altitude changes in Hold, Mission or Offboard mode, with bit 0 of "
+        "SDLOG_PROFILE set, its default. Takeoffs are left out: their ramp decides, not the gains.",
+        recording.notes,
+    )
     _require_columns(recording, refused)
     rows, acceleration_target, lean = (
         _rows(recording),

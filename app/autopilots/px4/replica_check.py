@@ -52,7 +52,6 @@ _LOG_MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
 )
 """The same in a log, whose rows are computed from themselves or the row before, with a hover thrust interpolated."""
 
-_OF_A_FLIGHT: Final = "the median over the flight; at a limit the thrust depends on the tilt, which is not recorded"
 _DOWN: Final = "Altitude, velocity and acceleration are positive down, as in PX4."
 _HOW: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
@@ -65,10 +64,6 @@ _NEEDED: Final = (
     "altitude_m", "climb_rate_m_s", "reference_m", "climb_rate_target_m_s", "acceleration_target_m_s2", "thrust_target",
     "takeoff_state",
 )  # fmt: skip
-_HINT: Final = (
-    "Give PX4's .ulg log of a flight with position control, recorded with bits 0 and 1 of SDLOG_PROFILE: with "
-    "bit 1 (estimator replay) every position is logged."
-)
 _SAME_RUN_S: Final = 0.004
 """A target is published at most so long after the position that it was computed from, the next position later."""
 
@@ -208,7 +203,11 @@ def _judged(signal: SignalResult, replay: Replay) -> SignalResult:
     median = float(np.median(np.where(np.isnan(apart), np.inf, apart)[given]))
     verdict = signal.verdict if signal.verdict == "exact" else "agrees" if median <= signal.tolerance else "differs"
     return replace(
-        signal, largest_difference=largest, median_difference=median, allowance=_OF_A_FLIGHT, verdict=verdict
+        signal,
+        largest_difference=largest,
+        median_difference=median,
+        allowance="the median over the flight; at a limit the thrust depends on the tilt, which is not recorded",
+        verdict=verdict,
     )
 
 
@@ -217,7 +216,12 @@ def px4_loop_log(recording: Recording, *, name: str) -> LoopLog:
 
     Raises InputError that names the topic or parameter that is missing or not supported.
     """
-    refused = refusal(f"{name} cannot be compared with the replica.", _HINT, error=InputError)
+    refused = refusal(
+        f"{name} cannot be compared with the replica.",
+        "Give PX4's .ulg log of a flight with position control, recorded with bits 0 and 1 of SDLOG_PROFILE: with "
+        "bit 1 (estimator replay) every position is logged.",
+        error=InputError,
+    )
     columns = recording.columns
     for each in _NEEDED:
         if each not in columns:

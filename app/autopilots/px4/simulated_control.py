@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.px4.replica import vertical as loop
-from app.autopilots.px4.replica.hover_range import hover_limits
-from app.autopilots.px4.replica.parameters import parameters_from
+from app.autopilots.px4.replica.parameters import hover_limits, parameters_from
 from app.autopilots.px4.simulated_trajectory import Limits, Trajectory
 from app.autopilots.simulated.body import TICK_S, Body
 from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint
@@ -44,13 +43,12 @@ _BIASED_ABOVE: Final = 0.2
 _FORGETTING: Final = 1000.0
 _VALID_BELOW: Final = 0.001
 _VALID_AFTER_S: Final = 2.0
-_LEAST_THRUST: Final = 0.05
 
 
 def estimator_settings(values: Mapping[str, float]) -> Samples:
     """Return the constants of `estimate_hover`, shape (5,), from parameters by the firmware's names."""
     low, highest = hover_limits(values["MPC_THR_HOVER"], values["HTE_THR_RANGE"])
-    lowest = max(low, _LEAST_THRUST)
+    lowest = max(low, 0.05)
     return np.array([values["HTE_HT_NOISE"], values["HTE_ACC_GATE"], lowest, highest, values["HTE_VZ_THR"]])
 
 

@@ -25,9 +25,6 @@ LATITUDE_E7: Final = 473977420
 LONGITUDE_E7: Final = 85455940
 HOME_AMSL_M: Final = 488.0
 
-ESTIMATE_AFTER_S: Final = 3.0
-"""Time from the start until the position is known well enough to arm and to be sent."""
-
 _LANDED_STATES: Final = {Phase.IDLE: 1, Phase.HOLDING: 2, Phase.CLIMBING: 3, Phase.LANDING: 4}
 """MAV_LANDED_STATE."""
 _SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
@@ -60,7 +57,8 @@ class ReportingCopter(SimulatedAutopilot):
         firmware = self.firmware
         super().__init__(body, firmware.dialect, Parameters(firmware.parameters), firmware.periods_s, system=system)
         self.uid = _SIMULATED | system
-        self.estimate_after_s = ESTIMATE_AFTER_S
+        self.estimate_after_s = 3.0
+        """Time from the start until the position is known well enough to arm and to be sent."""
         self.mode = firmware.modes[0]
         self.controller = controller
         self.is_breached, self.breaches = False, 0

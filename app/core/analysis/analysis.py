@@ -166,7 +166,10 @@ def analyze(flight: LoggedFlight) -> Analysis:
     gains = None if insufficient else propose(flight, estimate.few, [loop.gains, *usual.values()])
     proposed = assess("Proposed", gains) if gains else None
     if proposed is None:
-        insufficient = insufficient or f"{_NONE_ALLOWED} {loop.texts.lags}."
+        insufficient = insufficient or (
+            "No gains within the documented ranges reach the required margin on this vehicle. Reduce its lags first: "
+            f"{loop.texts.lags}."
+        )
     elif not _is_better(proposed, present):
         gains, proposed, insufficient = None, None, _NONE_BETTER
     return Analysis(
@@ -211,9 +214,6 @@ _BETTER: Final = 0.95
 _NONE_BETTER: Final = (
     "Keep the gains flown: their margin is sufficient, and no other gains are predicted to reduce the error by more "
     "than 5 %."
-)
-_NONE_ALLOWED: Final = (
-    "No gains within the documented ranges reach the required margin on this vehicle. Reduce its lags first:"
 )
 
 

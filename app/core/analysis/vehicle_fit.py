@@ -30,11 +30,9 @@ _LAGS_S: Final = np.linspace(0.0, 0.25, 26)
 _ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
 _FREE_FALL: Final = -0.95
 _LEAST_THROTTLE: Final = 0.01
-_LEAST_SLOPE: Final = 0.2
 _DRAWS_LOG2: Final = 5
 _INSTRUMENT_ROWS: Final = 4
 _FEW: Final = 5
-_SEED: Final = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,12 +220,12 @@ def _draws(regressions: Sequence[_Regression], weight: Samples) -> Samples:
     """Equally probable copters, shape (2^k, 4): slope, drag, hover throttle, lag."""
     from scipy.stats import norm, qmc
 
-    quantiles = qmc.Sobol(4, rng=np.random.default_rng(_SEED)).random_base2(_DRAWS_LOG2)
+    quantiles = qmc.Sobol(4, rng=np.random.default_rng(1)).random_base2(_DRAWS_LOG2)
     rows = []
     for lag_quantile, *others in quantiles:
         regression = regressions[int(np.searchsorted(np.cumsum(weight), lag_quantile))]
         slope, drag, constant = regression.mean + np.linalg.cholesky(regression.covariance) @ norm.ppf(others)
-        slope = max(slope, _LEAST_SLOPE)
+        slope = max(slope, 0.2)
         rows.append((slope, max(-drag * GRAVITY_M_S2, 0.0), math.exp(-constant / slope), regression.lag_s))
     return np.array(rows)
 

@@ -40,7 +40,6 @@ from app.core.records.trajectory import Samples, Trajectory
 
 WINDOW_S: Final = 60.0
 OUTPUT: Final = "pitch_error_rad"
-PRIOR_SD: Final = 0.35
 
 _SAMPLES: Final = round(WINDOW_S / STEP_S) + 1
 _M_PER_FT: Final = 0.3048
@@ -73,7 +72,7 @@ def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
             f"{'A' if column < STATES else 'B'}({_ROWS[row]}, {_COLUMNS[column]}) against the model",
             "ln ×",
             upper=2.5,
-            prior_sd=PRIOR_SD,
+            prior_sd=0.35,
             known_within=perturbation,
             lower=-2.5,
         )

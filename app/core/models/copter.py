@@ -21,28 +21,12 @@ from app.core.records.trajectory import Samples
 
 GRAVITY_M_S2: Final = 9.80665
 
-# Indices in a packed copter.
-HOVER_THROTTLE: Final = 0
-_SLOPE: Final = 1
-_LAG_GAIN: Final = 2
-_DRAG: Final = 3
-_B0: Final = 4
-_B1: Final = 5
-_B2: Final = 6
-_A1: Final = 7
-_A2: Final = 8
-_PACKED_SIZE: Final = 9
+HOVER_THROTTLE, _SLOPE, _LAG_GAIN, _DRAG, _B0, _B1, _B2, _A1, _A2, _PACKED_SIZE = range(10)
+"""Indices in a packed copter."""
 
-# Indices in the state array of the body.
-LAGGED: Final = 0
-ALTITUDE: Final = 1
-CLIMB_RATE: Final = 2
-SENSED: Final = 3
-_MEMORY_1: Final = 4
-_MEMORY_2: Final = 5
-BODY_SIZE: Final = 6
-"""Throttle after the motors' lag, altitude and climb rate as estimated, acceleration as sensed, and the memory of the
-accelerometer's filter."""
+LAGGED, ALTITUDE, CLIMB_RATE, SENSED, _MEMORY_1, _MEMORY_2, BODY_SIZE = range(7)
+"""Indices in the state array of the body: throttle after the motors' lag, altitude and climb rate as estimated,
+acceleration as sensed, and the memory of the accelerometer's filter."""
 
 REFERENCE: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2", "assumed_hover")
 """What a loop is given: the desired motion, and the throttle that it assumes to hover with."""

@@ -47,14 +47,10 @@ from app.core.records.trajectory import Samples
 
 GRAVITY_M_S2: Final = 9.81
 
-HOVER_THROTTLE: Final = 0
-START_LATENCY_S: Final = 1
-MOTOR_LAG_S: Final = 2
-DRAG_1_S: Final = 3
-QUADRATIC_SHARE: Final = 4
-GROUND_EFFECT: Final = 5
-MEASUREMENT_DELAY_S: Final = 6
-BATTERY_SAG: Final = 7
+(
+    HOVER_THROTTLE, START_LATENCY_S, MOTOR_LAG_S, DRAG_1_S, QUADRATIC_SHARE, GROUND_EFFECT, MEASUREMENT_DELAY_S,
+    BATTERY_SAG,
+) = range(8)  # fmt: skip
 """Indices in a model vector."""
 
 GROUND_EFFECT_HEIGHT_M: Final = 0.4

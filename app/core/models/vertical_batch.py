@@ -64,11 +64,7 @@ FASTEST_M_S: Final = 4000.0
 PAST: Final = 64
 """Length of the altitude and climb rate buffers, in steps: a power of two."""
 
-_POSITION: Final = 0
-_SPEED: Final = 1
-_FEED_FORWARD: Final = 2
-_CHECK: Final = 3
-_GUIDE_SIZE: Final = 4
+_POSITION, _SPEED, _FEED_FORWARD, _CHECK, _GUIDE_SIZE = range(5)
 """Rows of the table shared by all runs: reference position and speed, feed-forward, whether flight is checked."""
 
 _KP: Final = 0 * BATCH_WIDTH

@@ -38,14 +38,10 @@ from app.core.models.vertical import (
 )
 from app.core.records.trajectory import Samples
 
-HIGHEST_M: Final = 0
-HIGHEST_STEP: Final = 1
-FALLEN_STEP: Final = 2
-DISTANCE_MIDDLE_M: Final = 3
-DISTANCE_LAST_M: Final = 4
-SWING_MIDDLE_M_S: Final = 5
-SWING_LAST_M_S: Final = 6
-REPORT_SIZE: Final = 7
+(
+    HIGHEST_M, HIGHEST_STEP, FALLEN_STEP, DISTANCE_MIDDLE_M, DISTANCE_LAST_M, SWING_MIDDLE_M_S, SWING_LAST_M_S,
+    REPORT_SIZE,
+) = range(8)  # fmt: skip
 """Indices in the report of a flight.
 
 Fallen: the step at which it was back on the ground, or −1. Distances are from the last set point, after the altitude

@@ -42,7 +42,6 @@ class Glitch:
 
 _ALTITUDE: Final = "altitude_m"
 """The output whose physical limits are known. Others, such as a pitch error, are checked for gaps only."""
-_CLIMB_RATE: Final = "climb_rate_m_s"
 _SECOND_ALTITUDE: Final = "altitude_2_m"
 _LARGEST_ACCELERATION_M_S2: Final = 30.0
 """Upward, this takes a thrust of four times the weight; downward, gravity alone gives a third of it."""
@@ -80,7 +79,7 @@ def find_glitches(experiment: ScoredOutput, trajectory: Trajectory) -> tuple[Gli
     if experiment.output == _ALTITUDE:
         altitude = channels[_ALTITUDE]
         excess = _excess(time_s, altitude)
-        frozen = _frozen(time_s, altitude, channels.get(_CLIMB_RATE), excess)
+        frozen = _frozen(time_s, altitude, channels.get("climb_rate_m_s"), excess)
         found.extend(_held(time_s, altitude, mark) for mark in frozen)
         others = [*gaps, *frozen]
         jumps = [

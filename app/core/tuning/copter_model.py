@@ -46,7 +46,6 @@ from app.core.tuning.strategy import positive_interval, with_band
 
 _V = TypeVar("_V")
 
-_COMPARED: Final = "For comparison: "
 _DIGITS: Final = 3
 _MODEL_ERROR: Final = 0.04
 """Relative error of even the best fit: without it, 75 % of the flights of random vehicles under PX4 were inside their
@@ -240,7 +239,7 @@ class CopterModel(LimitedModel[Copter]):
     def _rule_note(self, name: str, error_m: float, margin: float, *, as_good_m: float) -> str:
         remark = ", which is predicted as good" if error_m <= as_good_m else ""
         remark = ", which lacks the margin" if margin < REQUIRED_MARGIN else remark
-        return f"{short(error_m)} {self._experiment.error_unit} with {name.removeprefix(_COMPARED)}{remark}"
+        return f"{short(error_m)} {self._experiment.error_unit} with {name.removeprefix('For comparison: ')}{remark}"
 
     @cached_property
     def _rules(self) -> Sequence[tuple[str, float, float]]:

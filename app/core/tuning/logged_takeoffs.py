@@ -32,7 +32,6 @@ _LARGEST_RESIDUAL_M: Final = (0.05, 0.15)
 _RESIDUAL_SHARE: Final = 0.4
 """Of the error. Takeoffs of vehicles beyond the model, in gusts, leave at most a third."""
 _KEEP: Final = "Keep the gains flown: no other gains are predicted to reduce the error by more than 5 %."
-FLY: Final = "Take off to 3 m with the block Takeoff, hold that height for 30 s, and land."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,4 +176,8 @@ def _require_likeness(best: Flight, residual_m: float) -> None:
 
 
 def _unanswered(reason: str) -> TrajectoryError:
-    return TrajectoryError("The log cannot be analysed.", hint=FLY, problems=(Problem("file", reason),))
+    return TrajectoryError(
+        "The log cannot be analysed.",
+        hint="Take off to 3 m with the block Takeoff, hold that height for 30 s, and land.",
+        problems=(Problem("file", reason),),
+    )

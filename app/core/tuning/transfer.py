@@ -35,13 +35,10 @@ _TAKEN: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transfer:
-    """Result of a transfer: the `evidence` that the strategy has to use, with a `sentence` about it.
-
-    `agreement` is None without a donor, and until this vehicle has flown; the sentence is then empty.
-    """
+    """Result of a transfer: the `evidence` that the strategy has to use, with a `sentence` about it; empty without
+    a donor, and until this vehicle has flown."""
 
     evidence: Evidence[ModelledExperiment]
-    agreement: float | None = None
     sentence: str = ""
 
 
@@ -69,12 +66,11 @@ def transfer(campaign: Evidence[ModelledExperiment]) -> Transfer:
     )
     if agreed < LEAST_AGREEMENT:
         sentence = f"Nothing is used from the other vehicle: {numbers}, less than {percent(LEAST_AGREEMENT)}."
-        return Transfer(evidence=modelled(experiment), agreement=agreed, sentence=sentence)
+        return Transfer(evidence=modelled(experiment), sentence=sentence)
     share = agreed if len(valid) == 1 else 1.0
     shortened = f" The first step is limited to {percent(share)} of its maximum." if share < 1.0 else ""
     return Transfer(
         evidence=modelled(_informed(experiment, donor, agreed), share),
-        agreement=agreed,
         sentence=f"{_TAKEN[isinstance(experiment, CALIBRATED)]}: {numbers}.{shortened}",
     )
 

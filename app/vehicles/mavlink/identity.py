@@ -1,12 +1,13 @@
 """Identity of the vehicle that answers, and of the one that is expected."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots import commands
 from app.autopilots.autopilot import AutopilotError
 from app.autopilots.measurements import Heartbeat, Version
 from app.autopilots.registry import AUTOPILOTS
+from app.core.formatting import capitalised
 from app.vehicles.base import Identity, VehicleError
 from app.vehicles.flight_end import FAILURE_TEXTS
 from app.vehicles.mavlink.failures import Failure
@@ -18,15 +19,14 @@ _AUTOPILOT: Final = 1
 _VERSION_ATTEMPTS: Final = 2
 _UID_ATTEMPTS: Final = 10
 """Attempts if the vehicle is known to report its hardware id: twice as many as for a parameter."""
-_NAME_ATTEMPTS: Final = 2
 
 
+@dataclass(slots=True)
 class VehicleIdentity:
     """Identity of the vehicle on a link beside the `pinned` one, which is known to a person; None before the first."""
 
-    def __init__(self, radio: AutopilotLink, pinned: Identity | None) -> None:
-        self._radio = radio
-        self.pinned = pinned
+    _radio: AutopilotLink
+    pinned: Identity | None
 
     @property
     def reported(self) -> Identity:
@@ -148,11 +148,11 @@ class VehicleIdentity:
         return problem
 
     def _has(self, parameter: str) -> bool:
-        return read_parameter(self._radio, parameter, attempts=_NAME_ATTEMPTS) is not None
+        return read_parameter(self._radio, parameter, attempts=2) is not None
 
 
 def _named(makes: frozenset[int]) -> str:
     """The autopilots with these MAV_AUTOPILOT."""
     titles = {profile.autopilot: profile.title for profile in AUTOPILOTS.values()}
     names = " and ".join(titles.get(make, f"another autopilot ({make})") for make in sorted(makes))
-    return names[:1].upper() + names[1:]
+    return capitalised(names)

@@ -323,8 +323,7 @@ class Link:
 
     def _accepts(self, message: Message, now_s: float) -> bool:
         """Count and record the message; return whether `receive` should return it."""
-        if message.get_type() == BAD_DATA:
-            self._health.bad += 1
+        if message.get_type() == BAD_DATA:  # a wrong checksum, or a wrong signature
             return False
         is_autopilot = self._is_vehicle(message)
         if is_autopilot:

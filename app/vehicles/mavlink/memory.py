@@ -30,8 +30,6 @@ from app.vehicles.mavlink.monitors.clock import (
     unwrapped,
 )
 
-_POSITIONS: Final = 1000
-_STATUS_TEXTS: Final = 5
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
 _BEHIND_S: Final = 20.0
@@ -141,9 +139,9 @@ class VehicleMemory:
     """Whether it reports that it may be armed in its mode; None if it never reports that. One that has done so, or that
     sends events, may not while it reports nothing."""
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
-    positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
+    positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=1000))
     restart_counter: RestartCounter = field(default_factory=RestartCounter)
-    status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=_STATUS_TEXTS))
+    status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=5))
     status_text_s: float | None = None
     _piece_of: int = field(init=False, default=0)
     _pieces: str = field(init=False, default="")

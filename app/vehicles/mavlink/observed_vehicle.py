@@ -26,8 +26,6 @@ from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial_state import State
 
 _POSITIONS_CEASED_S: Final = 2.0
-_NOT_STOPPED: Final = f"The vehicle has not confirmed within {STOPPING_S:g} s that its motors stopped."
-_DROPPED: Final = "The vehicle was not known to be on the ground: inspect it before it flies again."
 
 
 class ObservedVehicle(ABC):
@@ -232,7 +230,7 @@ class ObservedVehicle(ABC):
         self._quarantine.requested, self.has_stopped = requested("Motors off", words), None
         self._repeated = RepeatedCommand(self._radio, Action.KILL)
         if not self._is_flying and not self._radio.is_disarmed:
-            self._doubt_stop(_DROPPED)
+            self._doubt_stop("The vehicle was not known to be on the ground: inspect it before it flies again.")
 
     def _doubt_stop(self, why: str) -> None:
         self._quarantine.requested = f"{self._quarantine.requested} {why}"
@@ -250,7 +248,7 @@ class ObservedVehicle(ABC):
         if self.has_stopped is None and not self._is_flying and repeated.action is Action.KILL and repeated.is_over:
             self.has_stopped = repeated.has_stopped
             if not repeated.has_stopped:
-                self._doubt_stop(_NOT_STOPPED)
+                self._doubt_stop(f"The vehicle has not confirmed within {STOPPING_S:g} s that its motors stopped.")
 
     def _observe(self, why: str) -> None:
         self._quarantine.begin(State.OBSERVE, why)

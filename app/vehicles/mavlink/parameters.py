@@ -15,7 +15,7 @@ from typing import Final
 from app.autopilots import commands
 from app.autopilots.autopilot import GainParameter, GainSet, check_gains
 from app.autopilots.commands import Outgoing, Setting
-from app.autopilots.measurements import Measurement, Parameter
+from app.autopilots.measurements import Parameter
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch
 from app.vehicles.flight_end import FAILURE_TEXTS
@@ -118,10 +118,7 @@ def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
 def _request_parameter(
     radio: AutopilotLink, request: Outgoing, parameter: str, *, attempts: int = ATTEMPTS
 ) -> float | None:
-    def fits(reply: Measurement) -> bool:
-        return isinstance(reply, Parameter) and reply.name == parameter
-
-    answer = radio.request(request, fits, attempts=attempts)
+    answer = radio.request(request, lambda it: isinstance(it, Parameter) and it.name == parameter, attempts=attempts)
     return answer.value if isinstance(answer, Parameter) else None
 
 

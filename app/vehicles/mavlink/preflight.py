@@ -4,7 +4,6 @@ Each check results in an item; the items shown to the operator are the ones that
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from app.autopilots import commands
@@ -38,65 +37,8 @@ POSITIONS_HZ: Final = 40.0
 LOST_SHARE: Final = 0.2
 """Greatest share of the vehicle's positions that may be lost, whatever their rate."""
 SECONDARY_HZ: Final = 10.0
-_CHECKS_ATTEMPTS: Final = 2
+_DISARMED: Final = "disarmed"
 _NO_POSITION: Final = "Wait until it has a position (GPS, cameras or its own sensors), then check again."
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """A preflight check: its name in the API, its title, and what to do if it fails."""
-
-    name: str
-    title: str
-    hint: str = ""
-
-    def item(self, passed: bool, found: str, needed: str, *, hint: str = "") -> CheckItem:
-        """Return its result; `hint` replaces the usual one."""
-        hint = "" if passed else hint or self.hint
-        return CheckItem(name=self.name, title=self.title, passed=passed, found=found, needed=needed, hint=hint)
-
-
-HEARTBEAT: Final = Check("heartbeat", "Heartbeat", "Check that it is on and in range.")
-ALONE: Final = Check("alone", "System id", ONE_VEHICLE)
-DISARMED: Final = Check("disarmed", "Motors", LAND_FIRST)
-POSITION: Final = Check(
-    "position",
-    "Position",
-    "Configure its telemetry for tuning (docs/real-flight.md), or improve a weak link and wait for 10 s.",
-)
-CLOCK: Final = Check("clock", "Vehicle clock", "Restart the vehicle.")
-STILL: Final = Check("still", "Standing still", "Put it on firm ground and let its position settle.")
-BATTERY: Final = Check("battery", "Battery", "Insert a charged battery, or correct the limit.")
-FLIGHT_PLAN: Final = Check(
-    "flight_plan",
-    "Flight plan",
-    "Load a flight plan with these blocks (docs/real-flight.md), then connect again.",
-)
-GROUND_REFERENCE: Final = Check(
-    "ground_reference",
-    "Ground reference",
-    "Leave it on the ground where it starts, in its automatic mode, until it has a position, then check again: its "
-    "flight plan sets the reference, which takes 10 s.",
-)
-MOTORS_OFF: Final = Check(
-    "motors_off",
-    "Motors off",
-    "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
-)
-SECOND_SOURCE: Final = Check(
-    "second_source", "Second source of altitude", "Check that it tracks the vehicle and streams, or fly without it."
-)
-HARDWARE_ID: Final = Check(
-    "hardware_id",
-    "Hardware id",
-    "Check which vehicle it is, then try again. If it no longer reports one, connect it again and release it.",
-)
-HOME: Final = Check(
-    "home",
-    "Distance from HOME",
-    "Move it closer to the place where it was switched on, or reduce its “Maximum distance from the start”.",
-)
-ALTITUDES: Final = Check("altitudes", "Altitudes", "Choose a lower height, or smaller steps.")
 
 
 def evaluate_items(
@@ -106,13 +48,22 @@ def evaluate_items(
     items = [
         _heartbeat(radio),
         _single_vehicle(radio),
-        DISARMED.item(not radio.reports_armed, "armed" if radio.reports_armed else "disarmed", "disarmed"),
+        _item(
+            _DISARMED,
+            "Motors",
+            not radio.reports_armed,
+            "armed" if radio.reports_armed else "disarmed",
+            "disarmed",
+            LAND_FIRST,
+        ),
         *_motion(watched, find_reception(radio.seen.positions, radio.clock.now_s())),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
     if radio.profile.flying_blocks:
         blocks = "blocks for takeoff and landing"
-        items += [FLIGHT_PLAN.item(not plan_problem, plan_problem or blocks, blocks), _ground_reference(radio, watched)]
+        hint = "Load a flight plan with these blocks (docs/real-flight.md), then connect again."
+        plan = _item("flight_plan", "Flight plan", not plan_problem, plan_problem or blocks, blocks, hint)
+        items += [plan, _ground_reference(radio, watched)]
     if radio.profile.stop_settings:
         items.append(_stopping(radio))
     return (
@@ -126,34 +77,57 @@ def evaluate_secondary(secondary: AltitudeSource, watched: GroundObservation) ->
     rate_hz = len(watched.secondary_m) / watched.seconds
     rate = f"{rate_hz:.0f} samples per second of {secondary.name}"
     found = secondary.trouble.removesuffix(".") or rate
-    return SECOND_SOURCE.item(rate_hz >= SECONDARY_HZ, found, f"{SECONDARY_HZ:g} per second or more")
+    return _item(
+        "second_source",
+        "Second source of altitude",
+        rate_hz >= SECONDARY_HZ,
+        found,
+        f"{SECONDARY_HZ:g} per second or more",
+        "Check that it tracks the vehicle and streams, or fly without it.",
+    )
 
 
 def evaluate_uid(radio: AutopilotLink, pinned: Identity) -> CheckItem:
     """Compare the hardware id with the pinned one."""
     uid = radio.seen.uid
-    return HARDWARE_ID.item(uid == pinned.uid, uid or "not reported", f"{pinned.uid}, as registered")
+    return _item(
+        "hardware_id",
+        "Hardware id",
+        uid == pinned.uid,
+        uid or "not reported",
+        f"{pinned.uid}, as registered",
+        "Check which vehicle it is, then try again. If it no longer reports one, connect it again and release it.",
+    )
 
 
 def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radius_m: float) -> CheckItem:
     """Check the distance from HOME, the zero of its position: beyond `plan_radius_m` the flight plan lands the vehicle
     by itself, and beyond a larger distance it flies HOME and ignores all commands."""
-    needed = f"{plan_radius_m:g} m or less in total: beyond it the flight plan lands it"
-    if not watched.positions:
-        return HOME.item(False, "waiting for a position", needed)
-    away_m = max(abs(watched.positions[-1].north_m), abs(watched.positions[-1].east_m))
-    found = f"{away_m:.1f} m, plus the {radius_m:g} m that it may move from its start"
-    return HOME.item(away_m + radius_m <= plan_radius_m, found, needed)
+    passed, found = False, "waiting for a position"
+    if watched.positions:
+        away_m = max(abs(watched.positions[-1].north_m), abs(watched.positions[-1].east_m))
+        passed = away_m + radius_m <= plan_radius_m
+        found = f"{away_m:.1f} m, plus the {radius_m:g} m that it may move from its start"
+    return _item(
+        "home",
+        "Distance from HOME",
+        passed,
+        found,
+        f"{plan_radius_m:g} m or less in total: beyond it the flight plan lands it",
+        "Move it closer to the place where it was switched on, or reduce its “Maximum distance from the start”.",
+    )
 
 
 def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
     """Check that the flight plan does not land the vehicle before its record of `record_s` is complete."""
     needed_s = record_s + LAND_COMMAND_S
-    return Check("flight time", "Flight time").item(
+    return _item(
+        "flight time",
+        "Flight time",
         needed_s <= plan_time_s,
         f"{needed_s:g} s for the record and the command to land",
         f"{plan_time_s:g} s or less: after it the flight plan lands it",
-        hint="Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
+        "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
         f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
     )
 
@@ -162,12 +136,15 @@ def evaluate_set_points(set_points: SetPoints) -> CheckItem:
     """Check that the set points are well below the altitude limit and well above the ground."""
     first_m, lowest_m, highest_m = set_points.altitudes_m[0], min(set_points.altitudes_m), max(set_points.altitudes_m)
     pushed_m_s2 = max(map(abs, set_points.accelerations_m_s2), default=0.0)
-    return ALTITUDES.item(
+    return _item(
+        "altitudes",
+        "Altitudes",
         highest_m <= HIGHEST_SET_POINT_M and lowest_m > 0.5 * first_m and pushed_m_s2 <= LARGEST_PUSH_M_S2,
         f"set points from {lowest_m:g} to {highest_m:g} m"
         + (f", pushed by {pushed_m_s2:g} m/s²" if pushed_m_s2 else ""),
         f"above {0.5 * first_m:g} m, half of the first, and at most {HIGHEST_SET_POINT_M:g} m: the flight is "
         f"aborted at {ALTITUDE_LIMIT_M:g} m" + (f"; at most {LARGEST_PUSH_M_S2:g} m/s²" if pushed_m_s2 else ""),
+        "Choose a lower height, or smaller steps.",
     )
 
 
@@ -176,20 +153,23 @@ def evaluate_hover(hover_throttle: float | None, limits: HoverLimits | None) -> 
     item while one of the two is not known."""
     if hover_throttle is None or limits is None:
         return ()
-    item = Check("hover_throttle", "Hover throttle").item(
-        limits.low <= hover_throttle <= limits.high,
-        f"{hover_throttle:.2f} in the last flight",
-        limits.words,
-        hint=f"Set {limits.parameter} to {min(hover_throttle, limits.most):.2f}. If the vehicle or its load was "
-        "changed since that flight, disconnect it and connect it again instead.",
+    return (
+        _item(
+            "hover_throttle",
+            "Hover throttle",
+            limits.low <= hover_throttle <= limits.high,
+            f"{hover_throttle:.2f} in the last flight",
+            limits.words,
+            f"Set {limits.parameter} to {min(hover_throttle, limits.most):.2f}. If the vehicle or its load was "
+            "changed since that flight, disconnect it and connect it again instead.",
+        ),
     )
-    return (item,)
 
 
 def require(items: Sequence[CheckItem]) -> None:
     """Raise VehicleError naming every failed check, or SafeGainsError if the vehicle is armed."""
     failed = [item for item in items if not item.passed]
-    if any(item.name == DISARMED.name for item in failed):
+    if any(item.name == _DISARMED for item in failed):
         raise SafeGainsError(ARMED, hint=LAND_FIRST)
     if failed:
         found = "; ".join(f"{item.title}: {item.found}, required: {item.needed}" for item in failed)
@@ -197,25 +177,44 @@ def require(items: Sequence[CheckItem]) -> None:
         raise VehicleError(f"The vehicle is not ready to fly. {found}.", hint=hints or "Correct this, then try again.")
 
 
+def _item(name: str, title: str, passed: bool, found: str, needed: str, hint: str) -> CheckItem:
+    """The result of a check; `hint` says what to do if it failed."""
+    return CheckItem(name=name, title=title, passed=passed, found=found, needed=needed, hint="" if passed else hint)
+
+
 def _heartbeat(radio: AutopilotLink) -> CheckItem:
     age_s, heartbeat, title = radio.clock.now_s() - radio.seen.heartbeat_s, radio.seen.heartbeat, radio.profile.title
     version = f" {radio.seen.version}" if radio.seen.version else ""
     make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
     found = f"{title}{version}, system {radio.target.system}, {age_s:.1f} s ago" if make else "another autopilot"
-    return HEARTBEAT.item(make and age_s < radio.silence_s, found, f"{title}, within {radio.silence_s:g} s")
+    return _item(
+        "heartbeat",
+        "Heartbeat",
+        make and age_s < radio.silence_s,
+        found,
+        f"{title}, within {radio.silence_s:g} s",
+        "Check that it is on and in range.",
+    )
 
 
 def _single_vehicle(radio: AutopilotLink) -> CheckItem:
     reason = radio.link.duplicate_reason
     found = reason.removesuffix(".") or f"one vehicle uses system id {radio.target.system}"
-    return ALONE.item(not reason, found, "one vehicle per system id on this link")
+    return _item("alone", "System id", not reason, found, "one vehicle per system id on this link", ONE_VEHICLE)
 
 
 def _stopping(radio: AutopilotLink) -> CheckItem:
     ways = [f"the setting {name}" for name in radio.target.stop_settings]
     ways += ["the command to disarm"] if radio.target.stops_by_command else []
     found = " and ".join(ways) or "the vehicle did not confirm any command that stops its motors"
-    return MOTORS_OFF.item(bool(ways), found, "a confirmed way to stop its motors")
+    return _item(
+        "motors_off",
+        "Motors off",
+        bool(ways),
+        found,
+        "a confirmed way to stop its motors",
+        "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
+    )
 
 
 def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
@@ -226,13 +225,13 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
         radio.request(
             commands.command(radio.target, checks.command),
             lambda reply: isinstance(reply, VehicleEvent) and reply.number == checks.last,
-            attempts=_CHECKS_ATTEMPTS,
+            attempts=2,
         )
     ready = radio.seen.may_arm
     if ready is None:
         return ()
     found = "passed" if ready else f"not passed; {_reasons(radio)}"
-    return (Check("own_checks", "Arming checks of the autopilot", _checks_hint(radio)).item(ready, found, "passed"),)
+    return (_item("own_checks", "Arming checks of the autopilot", ready, found, "passed", _checks_hint(radio)),)
 
 
 def _reasons(radio: AutopilotLink) -> str:
@@ -263,30 +262,44 @@ def _motion(watched: GroundObservation, reception: tuple[float, float]) -> tuple
     passed_s = unwrapped(positions[-1], positions[0]).time_boot_s - positions[0].time_boot_s if positions else 0.0
     hint, waiting = ("", "") if positions else (_NO_POSITION, "waiting for a position")
     return (
-        POSITION.item(
+        _item(
+            "position",
+            "Position",
             rate_hz >= POSITIONS_HZ and lost_share <= LOST_SHARE,
             f"{rate_hz:.1f} per second, {100.0 * lost_share:.0f} % lost",
             f"{POSITIONS_HZ:g} per second or more, {100.0 * LOST_SHARE:.0f} % lost or less",
-            hint=hint,
+            hint
+            or "Configure its telemetry for tuning (docs/real-flight.md), or improve a weak link and wait for 10 s.",
         ),
-        CLOCK.item(
+        _item(
+            "clock",
+            "Vehicle clock",
             passed_s > 0.0,
             waiting or f"{passed_s:.2f} s passed in {watched.seconds:.2f} s",
             "an advancing clock",
-            hint=hint,
+            hint or "Restart the vehicle.",
         ),
-        STILL.item(
+        _item(
+            "still",
+            "Standing still",
             bool(positions) and moved_m <= STANDS_WITHIN_M,
             waiting or f"its altitude changed by {moved_m:.2f} m",
             f"{STANDS_WITHIN_M:g} m or less",
-            hint=hint,
+            hint or "Put it on firm ground and let its position settle.",
         ),
     )
 
 
 def _battery(battery_v: float | None, min_battery_v: float) -> CheckItem:
     found = "no voltage reported" if battery_v is None else f"{battery_v:.1f} V"
-    return BATTERY.item(battery_v is not None and battery_v >= min_battery_v, found, f"{min_battery_v:g} V or more")
+    return _item(
+        "battery",
+        "Battery",
+        battery_v is not None and battery_v >= min_battery_v,
+        found,
+        f"{min_battery_v:g} V or more",
+        "Insert a charged battery, or correct the limit.",
+    )
 
 
 def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> CheckItem:
@@ -297,8 +310,15 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
     if not is_set:
         mode = radio.profile.mode_names.get(_mode(radio), _mode(radio))
         found = f"not set by the flight plan (mode {mode}, block {radio.block or 'not reported'})"
-    needed = f"set by the flight plan, within {STANDS_WITHIN_M:g} m of where it stands"
-    return GROUND_REFERENCE.item(is_set and watched.is_at_reference, found, needed)
+    return _item(
+        "ground_reference",
+        "Ground reference",
+        is_set and watched.is_at_reference,
+        found,
+        f"set by the flight plan, within {STANDS_WITHIN_M:g} m of where it stands",
+        "Leave it on the ground where it starts, in its automatic mode, until it has a position, then check again: its "
+        "flight plan sets the reference, which takes 10 s.",
+    )
 
 
 def evaluate_requirement(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
@@ -310,7 +330,7 @@ def evaluate_requirement(radio: AutopilotLink, requirement: Requirement) -> Chec
     hint = f"{_correction(requirement, parameter, value)} in the autopilot; Gainline does not change it."
     passed = requirement.may_lack if value is None else requirement.is_met(value)
     found = "not reported" if value is None else f"{value:g}{off}"
-    return Check(f"failsafe {requirement.parameter}", f"{kind} {parameter}", hint).item(passed, found, requirement.what)
+    return _item(f"failsafe {requirement.parameter}", f"{kind} {parameter}", passed, found, requirement.what, hint)
 
 
 def _correction(requirement: Requirement, parameter: str, value: float | None) -> str:

@@ -68,8 +68,6 @@ class LinkHealth:
     """Messages of the vehicle that the dialect knows."""
     lost: int = 0
     """Messages missing by the vehicle's sequence numbers."""
-    bad: int = 0
-    """Sections of bad data: wrong checksums, wrong signatures."""
     foreign: int = 0
     """Datagrams of other senders and messages of other systems, all dropped."""
     last_packet_s: float | None = None

@@ -13,7 +13,7 @@ import numpy as np
 from app.core.control.vertical_guidance import RATE_HZ, STEP_S
 from app.core.errors import TrajectoryError
 from app.core.experiments.step_sequence import REFERENCE, SETTLED_FOR_S
-from app.core.formatting import count
+from app.core.formatting import capitalised, count
 from app.core.models.set_points import SetPoints, on_step
 from app.core.models.vertical_batch import reference_altitude
 from app.core.records.alignment import Alignment, align, compare, resample
@@ -72,7 +72,7 @@ def add_secondary_altitude(
             f"({apart.rms_m:.2f} m root mean square)."
         )
     if gap := _longest_gap(other_s - alignment.delay_s, trajectory):
-        remarks.append(f"{name[0].upper()}{name[1:]} has no samples for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
+        remarks.append(f"{capitalised(name)} has no samples for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
     both = (
         _on_the_second_s_times(trajectory, other_s - alignment.delay_s, other_m - alignment.datum_m)
         if scored == "mocap"

@@ -29,8 +29,6 @@ RECEIVE_BUFFER: Final = 1 << 20
 BACKLOG: Final = 4096
 """Bytes that may wait for a stalled stream: 0.7 s at 57 600 baud. Beyond that, commands would be late."""
 REOPEN_EVERY_S: Final = 1.0
-CONNECT_WITHIN_S: Final = 2.0
-UNACKNOWLEDGED_MS: Final = 5000
 
 
 class LinkError(VehicleError):
@@ -238,12 +236,12 @@ class _Waiter:
 
 
 def _connected(host: str, port: int) -> socket.socket:
-    connection = socket.create_connection((host, port), timeout=CONNECT_WITHIN_S)
+    connection = socket.create_connection((host, port), timeout=2.0)
     connection.setblocking(False)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
     if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux: a vehicle that is switched off does not close the connection
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 5000)
     return connection
 
 

@@ -29,9 +29,6 @@ from app.vehicles.mavlink.trial_state import State, Trial
 STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""
 
-_LAND_REPEATED: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
-_LAND_WAS_REPEATED: Final = "Land was still being repeated when this record ended."
-_RESTARTED: Final = "It restarted: its gains have not been read since."
 _STAGE_AGAIN: Final = "Press Stage gains so that they are written and read back again."
 
 
@@ -58,7 +55,9 @@ class MavlinkVehicle(VehicleConnection):
         problem = self._radio.link.log_problem
         troubles = (
             f"The telemetry log {problem}." if problem else "",
-            _RESTARTED if self._gains.have_restarted and self._flight is None else "",
+            "It restarted: its gains have not been read since."
+            if self._gains.have_restarted and self._flight is None
+            else "",
             self._secondary.trouble if self._secondary is not None else "",
             self._flight.trouble if self._flight is not None else "",
             self._repeated.trouble if self._repeated is not None else "",
@@ -271,7 +270,7 @@ class MavlinkVehicle(VehicleConnection):
         if not by_hand and not is_disarmed and self._repeated is None:
             with suppress(LinkError):
                 self._repeated = RepeatedCommand(self._radio, Action.LAND, by_person=False)
-                self._quarantine.requested = _LAND_REPEATED
+                self._quarantine.requested = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
 
     # ---- records
 
@@ -312,7 +311,9 @@ class MavlinkVehicle(VehicleConnection):
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
-            end=records.end_of(trial, _LAND_WAS_REPEATED if lands else "", both.remark),
+            end=records.end_of(
+                trial, "Land was still being repeated when this record ended." if lands else "", both.remark
+            ),
             settings={**self._options, **self._loop, **both.settings},
         )
 
