@@ -17,6 +17,7 @@ from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
 from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
+from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
     ParameterHistory,
@@ -83,7 +84,7 @@ _IN_TAKEOFFS: Final = frozenset(
     {"TKOFF_SLEW_TIME", "TKOFF_THR_MAX", "MPC_TKO_RAMP_T", "COM_SPOOLUP_TIME", "MPC_LAND_SPEED"}
 )
 """Parameters that act in takeoffs and landings alone."""
-_MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, px4.HOVER_RANGE_NAME})
+_MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, HOVER_RANGE_NAME})
 """Parameters that some releases lack."""
 
 

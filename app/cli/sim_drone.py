@@ -4,10 +4,11 @@ import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 
+from app.autopilots.simulated_kinds import SIMULATED
 from app.cli.console import console
 from app.common.errors import InputError, Problem
 from app.core.clock import ScaledClock
-from app.simdrone.catalogue import SIMULATED, get_autopilot, new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import Drone, Server, parse_fault
 from app.simdrone.motion_capture import open_outlet
 from app.vehicles.mavlink.addresses import Address, is_loopback, parse

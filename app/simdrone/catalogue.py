@@ -1,16 +1,15 @@
 """What simulated drones are made of: simulated autopilots by their names, and airframes, the simulations of vehicle
 kinds as the flights of a body."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from types import MappingProxyType
 from typing import Final, Protocol
 
 import numpy as np
 
-from app.autopilots.registry import AUTOPILOTS
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_STEPS, Body, SimulatedKind, VerticalCommand
+from app.autopilots.simulated_kinds import SIMULATED
 from app.core.control.vertical_guidance import Z_SUM_ERR
 from app.core.errors import InputError, Problem
 from app.vehicles.base import OptionValue, VehicleError
@@ -19,16 +18,6 @@ from app.vehicles.kernels import ALTITUDE, BATTERY, CLIMB_RATE, COMMAND_SIZE, KD
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.simulated import Simulation
 from app.vehicles.twin import TWIN, TwinFlight
-
-
-def _kinds() -> Iterator[SimulatedKind]:
-    for autopilot in AUTOPILOTS:
-        yield from import_module(f"app.autopilots.{autopilot}.simulated").KINDS
-
-
-SIMULATED: Final[Mapping[str, SimulatedKind]] = MappingProxyType({kind.name: kind for kind in _kinds()})
-"""Simulated counterparts of the autopilots, `KINDS` in `simulated.py` of each one's folder, by name; of each autopilot
-the default first."""
 
 
 def get_autopilot(name: str) -> SimulatedKind:

@@ -10,8 +10,8 @@ import pytest
 from pymavlink.dialects.v10 import paparazzi as mavlink
 from typer.testing import CliRunner, Result
 
+from app.autopilots.simulated_kinds import SIMULATED
 from app.cli.commands import app
-from app.simdrone.catalogue import SIMULATED
 from app.simdrone.fault_kinds import FAULTS
 from tests.waiting import Waits
 

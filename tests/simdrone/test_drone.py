@@ -12,9 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from app.autopilots.simulated.body import MOTORS_OFF, TICK_S, TICK_STEPS, throttle_command
+from app.autopilots.simulated_kinds import SIMULATED
 from app.core.control.vertical_guidance import RATE_HZ
 from app.core.errors import InputError
-from app.simdrone.catalogue import SIMULATED, get_autopilot, new_body
+from app.simdrone.catalogue import get_autopilot, new_body
 from app.simdrone.drone import CATCH_UP_S
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock

@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 
 from app.autopilots.copter_loop import CopterLoop
 from app.autopilots.px4.replica import vertical
-from app.autopilots.px4.replica.parameters import (
-    DEFAULTS,
+from app.autopilots.px4.replica.hover_range import (
     HOVER_RANGE,
     HOVER_RANGE_NAME,
     HOVER_THRUSTS,
+    hover_deviation,
+    hover_limits,
+)
+from app.autopilots.px4.replica.parameters import (
+    DEFAULTS,
     LOOP_NAMES,
     Parameters,
     estimator_step_s,
-    hover_deviation,
-    hover_limits,
     low_pass_gain,
     parameters_from,
     step_parameters,

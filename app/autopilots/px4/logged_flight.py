@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
-from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, hover_deviation, parameters_from
+from app.autopilots.px4.replica.hover_range import hover_deviation
+from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, parameters_from
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
 from app.autopilots.recording import LONGEST_INTERVAL_S, Recording, Refused, Rows, refusal
 from app.autopilots.segments import (

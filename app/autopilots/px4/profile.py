@@ -12,15 +12,8 @@ from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
-from app.autopilots.px4.replica.parameters import (
-    ESTIMATOR_NAMES,
-    HOVER_RANGE_NAME,
-    HOVER_THRUSTS,
-    LOOP_NAMES,
-    UNSUPPORTED,
-    hover_deviation,
-    hover_limits,
-)
+from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME, HOVER_THRUSTS, hover_deviation, hover_limits
+from app.autopilots.px4.replica.parameters import ESTIMATOR_NAMES, LOOP_NAMES, UNSUPPORTED
 from app.core.errors import InputError
 
 _HOVER: Final = "MPC_THR_HOVER"

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.px4.replica import vertical as loop
-from app.autopilots.px4.replica.parameters import hover_limits, parameters_from
+from app.autopilots.px4.replica.hover_range import hover_limits
+from app.autopilots.px4.replica.parameters import parameters_from
 from app.autopilots.px4.simulated_trajectory import Limits, Trajectory
 from app.autopilots.simulated.body import TICK_S, Body
 from app.autopilots.simulated.copter_control import AltitudeController, Phase, SetPoint

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.core.control.parameter_checks import ReplicaParameters, parameter, require_within
 from app.core.errors import InputError, Problem
 
@@ -56,14 +57,6 @@ def low_pass_gain(cutoff_hz: float, sample_s: float) -> float:
     return float(sample / (sample + np.float32(1.0) / (np.float32(2.0 * math.pi) * np.float32(cutoff_hz))))
 
 
-HOVER_THRUSTS: Final = (0.1, 0.8)
-"""Documented range of MPC_THR_HOVER."""
-HOVER_RANGE_NAME: Final = "HTE_THR_RANGE"
-HOVER_RANGE: Final = 0.2
-"""How far the estimated hover thrust may be from MPC_THR_HOVER, by default."""
-_HIGHEST_LOW, _LOWEST_HIGH, _HIGHEST = 0.8, 0.2, 0.9
-"""Ends of the limits of the estimate, whatever the parameters are."""
-
 _PREDICTION, _IMU_RATE = "EKF2_PREDICT_US", "IMU_INTEG_RATE"
 _PREDICTION_US, _IMU_HZ = 10_000.0, 200.0
 _LONGEST_STEP_S: Final = 0.02
@@ -103,15 +96,3 @@ def parameters_from(values: Mapping[str, float]) -> Parameters:
             problems=problems,
         )
     return Parameters().changed(values)
-
-
-def hover_deviation(values: Mapping[str, float]) -> float:
-    """HTE_THR_RANGE of the firmware's values by name, or its default. Raises InputError if it is outside its range."""
-    require_within(values, {HOVER_RANGE_NAME: (0.0, 1.0)})
-    return values.get(HOVER_RANGE_NAME, HOVER_RANGE)
-
-
-def hover_limits(hover_thrust: float, deviation: float) -> tuple[float, float]:
-    """Least and largest hover thrust that the estimator finds, with MPC_THR_HOVER and HTE_THR_RANGE."""
-    low, high = hover_thrust - deviation, hover_thrust + deviation
-    return min(max(low, 0.0), _HIGHEST_LOW), min(max(high, _LOWEST_HIGH), _HIGHEST)
