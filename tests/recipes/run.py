@@ -1,7 +1,8 @@
 """Add what CONTRIBUTING.md says how to add, as it says, and run the tests that use it: `python -m tests.recipes.run
-RECIPE`."""
+RECIPE…`."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -109,15 +110,19 @@ RECIPES: Final = {
 }
 
 
-def run(name: str) -> int:
-    recipe, folder = RECIPES[name], HERE / name
-    add({module: folder / file for module, file in recipe.added.items()}, *recipe.given, *recipe.changes)
+def run(names: Sequence[str]) -> int:
+    recipes = {HERE / name: RECIPES[name] for name in names}
+    add(
+        {module: folder / file for folder, recipe in recipes.items() for module, file in recipe.added.items()},
+        *(change for recipe in recipes.values() for change in (*recipe.given, *recipe.changes)),
+    )
     import pytest
 
     options = ("-q", "-n", "0", "-p", "no:cacheprovider")
-    codes = [pytest.main([*options, *tests]) for tests in ((str(folder / "used.py"),), recipe.tests) if tests]
+    codes = [pytest.main([*options, *(str(folder / "used.py") for folder in recipes)])]
+    codes += [pytest.main([*options, *recipe.tests]) for recipe in recipes.values() if recipe.tests]
     return max(codes)
 
 
 if __name__ == "__main__":
-    sys.exit(run(sys.argv[1]))
+    sys.exit(run(sys.argv[1:]))
