@@ -29,7 +29,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
       className={`${panel["panel"]} ${classes["card"]}`}
       style={{ borderColor: vehicle.state === "quarantined" ? "var(--bad)" : undefined }}
     >
-      <Stack gap={8} flex="99 1 340px">
+      <Stack gap={8} flex="999 1 340px">
         <Group gap="4px 12px">
           <VehicleBadge isReal={vehicle.is_real} />
           <Text component="h3" lh="inherit">
