@@ -109,7 +109,7 @@ export function AppFrame({ children }: { children: ReactNode }) {
               <CampaignVehicle campaignId={campaignId} />
             )}
           </Box>
-          <Stack gap={6} className={classes["flights"] ?? ""}>
+          <Stack gap={6} miw={0} ml="auto" py={8}>
             {flying.map((one) => (
               <FlyingBar key={one.trialId} flying={one} abort={abort} />
             ))}

@@ -1,4 +1,4 @@
-import { ActionIcon, Box, Text, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
+import { ActionIcon, Box, Group, Text, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
 import { IconMoon, IconPlugConnected, IconPlugConnectedX, IconRefresh, IconSun } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
@@ -83,7 +83,13 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");
   return (
-    <section className={classes["flight"]} aria-label={`Flight in progress: ${flying.name}`}>
+    <Group
+      component="section"
+      justify="flex-end"
+      gap="clamp(8px, 2vw, 14px)"
+      wrap="nowrap"
+      aria-label={`Flight in progress: ${flying.name}`}
+    >
       <Box className={classes["vehicle"]} maw={220} visibleFrom="xs">
         <VehicleBadge isReal={flying.isReal} title={flying.vehicleName} />
       </Box>
@@ -95,7 +101,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
       )}
       <Link
         to={`/fly/${flying.trialId}`}
-        className={`${classes["readings"]} numbers`}
+        className={classes["readings"]}
         data-stale={!isCurrent || undefined}
         title="Open fly screen"
       >
@@ -110,7 +116,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
         )}
       </Link>
       {!isDown(status, time !== undefined) && <AbortButton trialId={flying.trialId} stage={stage} abort={abort} />}
-    </section>
+    </Group>
   );
 }
 

@@ -38,14 +38,21 @@ export function MainNav({ isInFlight }: { isInFlight: boolean }) {
   const inMenu = PAGES.some(({ to, inRow }) => to === pathname && !inRow);
   const rowFrom = isInFlight ? "lg" : "sm";
   return (
-    <Box component="nav" aria-label="Pages" className={classes["nav"]} visibleFrom={isInFlight ? "xs" : undefined}>
-      <Box component="ul" className={classes["row"]} visibleFrom={rowFrom}>
+    <Group
+      component="nav"
+      flex="none"
+      gap={2}
+      wrap="nowrap"
+      aria-label="Pages"
+      visibleFrom={isInFlight ? "xs" : undefined}
+    >
+      <Group component="ul" gap={2} wrap="nowrap" visibleFrom={rowFrom}>
         {PAGES.filter(({ inRow }) => inRow).map((page) => (
           <li key={page.to}>
             <PageLink {...page} />
           </li>
         ))}
-      </Box>
+      </Group>
       <UnstyledButton
         className={classes["link"] ?? ""}
         data-here={inMenu || undefined}
@@ -68,6 +75,6 @@ export function MainNav({ isInFlight }: { isInFlight: boolean }) {
           </Box>
         ))}
       </ul>
-    </Box>
+    </Group>
   );
 }

@@ -41,11 +41,7 @@ function VehicleLine({ vehicle, isBrief }: { vehicle: Vehicle; isBrief: boolean 
   const stale = aged === null || !aged.isCurrent;
   const low = lowBattery(vehicle, aged?.status.batteryV);
   return (
-    <section
-      className={`${classes["line"]} numbers`}
-      data-brief={isBrief || undefined}
-      aria-label={`Vehicle ${vehicle.name}`}
-    >
+    <section className={classes["line"]} data-brief={isBrief || undefined} aria-label={`Vehicle ${vehicle.name}`}>
       <Link to={`/vehicles/${vehicle.id}`} className={classes["name"]}>
         <VehicleBadge isReal={vehicle.is_real} title={vehicle.name} />
       </Link>
@@ -116,13 +112,14 @@ function HeldGains({ vehicle, held, stale }: HeldProps) {
   const known = inOrder(held, Object.keys(safe));
   if (Object.keys(known).length === 0) return <Fact isStale>gains not read · safe {gainsInBrackets(safe)}</Fact>;
   const isSafe = sameHeld(known, safe);
+  const Compared = stale ? "span" : "strong";
   return (
     <Fact title={`${Object.keys(safe).join(", ")}, read back`} isStale={stale}>
       <Text span inherit c="dimmed" visibleFrom="xs">
         gains
       </Text>
       {gainsInBrackets(known)}
-      <strong data-tone={isSafe ? "good" : "warn"}>{isSafe ? "safe" : `safe ${gainsInBrackets(safe)}`}</strong>
+      <Compared data-tone={isSafe ? "good" : "warn"}>{isSafe ? "safe" : `safe ${gainsInBrackets(safe)}`}</Compared>
     </Fact>
   );
 }
@@ -134,7 +131,7 @@ function InControl({ vehicle }: { vehicle: Vehicle }) {
   const who = isOwn ? `${own.operator} (you)` : (control?.operator ?? "no operator");
   return (
     <Fact Icon={IconUser} name="In control:" title="Operator in control" isStale={control === null && !isOwn}>
-      <Text span inherit truncate className={classes["who"] ?? ""}>
+      <Text span inherit truncate maw="min(180px, 28vw)">
         {who}
       </Text>
     </Fact>

@@ -1,3 +1,4 @@
+import { Box } from "@mantine/core";
 import { IconOctagonFilled } from "@tabler/icons-react";
 import { ABORT_LABELS, type AbortControl, type AbortStage } from "../live/flights";
 import classes from "./AbortButton.module.css";
@@ -21,7 +22,11 @@ export function AbortButton({ trialId, stage, abort, isLarge = false }: Props) {
     >
       <IconOctagonFilled size={isLarge ? 40 : 20} aria-hidden />
       {ABORT_LABELS[stage]}
-      {stage === "none" && <kbd>Space</kbd>}
+      {stage === "none" && (
+        <Box component="kbd" fw={550} visibleFrom="sm">
+          Space
+        </Box>
+      )}
     </button>
   );
 }

@@ -97,12 +97,15 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
         onContextMenu={(event) => event.preventDefault()}
       >
         <svg viewBox="0 0 48 48" width={56} height={56} overflow="visible" aria-hidden>
-          <circle cx={24} cy={24} r={20} />
+          <circle cx={24} cy={24} r={20} fill="var(--real-stripe-a)" stroke="rgb(74 35 0 / 30%)" strokeWidth={5} />
           <circle
             cx={24}
             cy={24}
             r={20}
-            className={classes["share"]}
+            fill="none"
+            stroke="currentcolor"
+            strokeWidth={5}
+            transform="rotate(-90 24 24)"
             strokeDasharray={AROUND}
             strokeDashoffset={AROUND * (1 - (share ?? 0))}
           />

@@ -34,7 +34,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
         {vehicle.registered ? vehicle.name : vehicle.title}
       </Note>
       <Sparkline curves={spark} setPoint={units.setPoint} />
-      <Stack component="dl" gap={4} className="numbers">
+      <Stack component="dl" gap={4}>
         <LabelledValue
           title={(best?.standard_error ?? null) === null ? "Best error" : "Best error ± standard error"}
           value={plusMinus(best?.mean, best?.standard_error, units.error)}

@@ -102,7 +102,7 @@ function Flights({
   const unit = useUnits(experiment).error;
   if (trials.data === undefined) return <ErrorNotice error={trials.error} />;
   return (
-    <ul className={`${classes["flights"]} numbers`}>
+    <ul className={classes["flights"]}>
       {trials.data
         .filter(({ state }) => wasFlown(state))
         .map(({ id, number, state, error, gains }) => (

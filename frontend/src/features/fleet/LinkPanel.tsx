@@ -51,7 +51,7 @@ export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boo
     >
       <Stack gap={14}>
         {isLinked ? (
-          <dl className={`${classes["facts"]} numbers`}>
+          <dl className={classes["facts"]}>
             <LabelledValue title="Link age" topic="linkAge" value={linkText(aged)} bad={stale} />
             {Object.entries(readings).map(([title, value]) => (
               <LabelledValue key={title} title={title} value={value} stale={stale} />
@@ -118,7 +118,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
   return (
     <Panel title="Battery">
       <Stack gap={14}>
-        <dl className={`${classes["facts"]} numbers`}>
+        <dl className={classes["facts"]}>
           <LabelledValue
             title={low === "" ? "Voltage" : `Voltage, ${low}`}
             value={withUnit(status?.status.batteryV, "V", 1)}

@@ -93,7 +93,7 @@ export function MotorsOff({ vehicle, status, orders, watching }: Props) {
   const asked = vehicle.actions.includes("motors off") || status?.status.armed === true;
   const enabled = asked && !watching;
   return (
-    <div className={classes["motorsOff"]}>
+    <Group gap="8px 14px" className={classes["motorsOff"] ?? ""}>
       <SlideToConfirm
         label="Motors off – the drone falls"
         meaning="Stops the motors at any altitude."
@@ -101,7 +101,7 @@ export function MotorsOff({ vehicle, status, orders, watching }: Props) {
         onConfirm={() => orders.press("motors off")}
       />
       <CommandResult orders={orders} isDown={isDisarmed(status)} />
-    </div>
+    </Group>
   );
 }
 

@@ -10,6 +10,7 @@ import { VehicleBadge } from "../../ui/Badges";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { ErrorNotice } from "../../ui/Notices";
+import panel from "../../ui/Panel.module.css";
 import classes from "./Fleet.module.css";
 import { VehicleStateBadge } from "./VehicleStateBadge";
 
@@ -22,11 +23,13 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const isKnown = Object.keys(held).length > 0;
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
-    <li
-      className={classes["card"]}
-      style={{ alignItems: "center", borderColor: vehicle.state === "quarantined" ? "var(--bad)" : undefined }}
+    <Group
+      component="li"
+      gap="10px 16px"
+      className={`${panel["panel"]} ${classes["card"]}`}
+      style={{ borderColor: vehicle.state === "quarantined" ? "var(--bad)" : undefined }}
     >
-      <Stack gap={8} miw={0}>
+      <Stack gap={8} flex="999 1 340px">
         <Group gap="4px 12px">
           <VehicleBadge isReal={vehicle.is_real} />
           <Text component="h3" lh="inherit">
@@ -36,7 +39,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
           </Text>
           <VehicleStateBadge vehicle={vehicle} />
         </Group>
-        <dl className={`${classes["readings"]} numbers`}>
+        <Group component="dl" gap="6px 22px" align="stretch">
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
           {vehicle.registered && (isKnown || isLinked) && (
@@ -47,13 +50,14 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
           )}
           <Fact title={`Safe ${names.join(", ")}`} value={gainsInBrackets(vehicle.safe_gains)} />
           {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}
-        </dl>
+        </Group>
         {vehicle.state === "quarantined" && <Aside tone="bad">{vehicle.concern}</Aside>}
         <ErrorNotice error={ask.error} />
       </Stack>
       {vehicle.registered && vehicle.actions.includes("connect") && (
         <Button
           variant="default"
+          flex="1 0 auto"
           leftSection={<IconPlugConnected size={20} aria-hidden />}
           loading={ask.isPending}
           onClick={() => ask.mutate("connect")}
@@ -62,11 +66,11 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
         </Button>
       )}
       {vehicle.state === "quarantined" && (
-        <Button component={Link} to={`/vehicles/${vehicle.id}`} color="red" variant="outline">
+        <Button component={Link} to={`/vehicles/${vehicle.id}`} color="red" variant="outline" flex="1 0 auto">
           Open vehicle
         </Button>
       )}
-    </li>
+    </Group>
   );
 }
 

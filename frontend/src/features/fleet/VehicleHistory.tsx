@@ -1,4 +1,4 @@
-import { Anchor, Skeleton, Stack } from "@mantine/core";
+import { Anchor, Skeleton, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useActs, useLedger } from "../../api/fleet";
@@ -37,8 +37,10 @@ function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> 
   const ledger = useLedger(vehicle.id);
   const lines = ledger.data?.items ?? [];
   const names = Object.keys(vehicle.safe_gains);
-  const written = (gains: GivenGains["asked"], className = "") => (
-    <span className={`quantity ${className}`}>{gainsInBrackets(gains, names)}</span>
+  const written = (gains: GivenGains["asked"], differs = false) => (
+    <Text span inherit className="quantity" {...(differs && { c: "var(--bad)", fw: 650 })}>
+      {gainsInBrackets(gains, names)}
+    </Text>
   );
   return (
     <Panel title="Gain history" className={classes["wide"]}>
@@ -62,9 +64,7 @@ function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> 
               title: "Read back",
               isText: true,
               cell: ({ read_back, asked }) =>
-                read_back === null
-                  ? NOTHING
-                  : written(read_back, isSent(asked) && !sameHeld(read_back, asked) ? classes["differs"] : ""),
+                read_back === null ? NOTHING : written(read_back, isSent(asked) && !sameHeld(read_back, asked)),
             },
             { title: "Outcome", isText: true, cell: ({ outcome }) => outcome },
           ]}

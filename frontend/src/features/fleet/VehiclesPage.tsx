@@ -42,11 +42,11 @@ function Vehicles({ title, vehicles }: { title: string; vehicles: readonly Vehic
       <Title order={2} c="dimmed" fz="body" mb={10}>
         {title}
       </Title>
-      <ul className={classes["list"]} aria-label={title}>
+      <Stack component="ul" gap={10} aria-label={title}>
         {vehicles.map((vehicle) => (
           <VehicleCard key={vehicle.id} vehicle={vehicle} />
         ))}
-      </ul>
+      </Stack>
     </section>
   );
 }

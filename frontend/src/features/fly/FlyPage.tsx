@@ -18,9 +18,11 @@ import { VehicleBadge } from "../../ui/Badges";
 import { asSentence } from "../../ui/format";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ReadOnlyNotice } from "../../ui/Notices";
+import panel from "../../ui/Panel.module.css";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { windowOf } from "../campaign/campaignSettings";
+import fleet from "../fleet/Fleet.module.css";
 import { CommandResult, LandNow, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { type FlyStep, flyStateLabel, flyStep, gainsShown, isAirborneStep } from "./flyScreen";
@@ -134,7 +136,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
         windowS={windowS}
         endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
       />
-      <div className={classes["chart"]}>
+      <div className={`${panel["panel"]} ${classes["chart"]}`}>
         {figure !== null && (
           <Chart
             figure={figure}
@@ -144,7 +146,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           />
         )}
       </div>
-      <section className={classes["steps"]} aria-label="Next action">
+      <section className={`${panel["panel"]} ${classes["steps"]}`} aria-label="Next action">
         {readiness !== null && (
           <ReadinessLosses losses={readiness.losses.filter(({ kind }) => !quarantined || kind !== "quarantined")} />
         )}
@@ -206,7 +208,7 @@ interface QuarantineProps {
 /** Reason of the quarantine, the Land command, and a link to the release. */
 function Quarantine({ vehicle, concern, isDown, orders }: QuarantineProps) {
   return (
-    <Stack gap={10} className={classes["quarantine"] ?? ""}>
+    <Stack gap={10} p="12px 14px" className={fleet["quarantine"] ?? ""}>
       <div role="alert">
         <Group gap={8} c="var(--bad)">
           <IconAlertOctagonFilled size={24} aria-hidden />

@@ -5,9 +5,8 @@ import type { Trial, Vehicle } from "../../api/types";
 import { useIsCurrent } from "../../live/store";
 import { isSaturated, type LiveFlight, outputNow, readingOf, throttleNow } from "../../live/telemetry";
 import { type Aged, ageText, linkText, lowBattery } from "../../live/vehicleStatus";
-import type { Topic } from "../../ui/explanations";
 import { gainText, NOTHING, withUnit } from "../../ui/format";
-import { HelpTip } from "../../ui/HelpTip";
+import { LabelledValue } from "../../ui/LabelledValue";
 import { percentOrNothing } from "../../ui/uncertainty";
 import classes from "./Fly.module.css";
 import { type GainTick, gainTicks, secondsLeft } from "./flyScreen";
@@ -31,41 +30,16 @@ interface Props {
   windowS: number | null;
 }
 
-interface ReadingProps {
-  title: string;
-  value: string;
-  topic?: Topic | undefined;
-  size?: "huge" | "large";
-  stale?: boolean;
-  bad?: boolean;
-}
-
-function Reading({ title, value, topic, size, stale, bad }: ReadingProps) {
-  return (
-    <div
-      className={classes["reading"]}
-      data-size={size}
-      data-stale={stale || undefined}
-      data-tone={bad ? "bad" : undefined}
-    >
-      <dt>
-        {title} {topic && <HelpTip topic={topic} />}
-      </dt>
-      <dd>{value}</dd>
-    </div>
-  );
-}
-
 /** State of the link: its age, or why there is no data. */
 function LinkReading({ status }: { status: Aged | null }) {
   if (status?.status.state === "gone" && status.linkAgeS !== null) {
-    return <Reading title="Link lost for" topic="linkAge" value={ageText(status.linkAgeS)} bad />;
+    return <LabelledValue title="Link lost for" topic="linkAge" value={ageText(status.linkAgeS)} bad />;
   }
   if (status === null || status.status.state !== "connected") {
-    return <Reading title="Link" value={linkText(status)} bad />;
+    return <LabelledValue title="Link" value={linkText(status)} bad />;
   }
   const title = status.isCurrent ? "Link age" : "No data for";
-  return <Reading title={title} topic="linkAge" value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
+  return <LabelledValue title={title} topic="linkAge" value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
 }
 
 /** The value, or the last one that there was. */
@@ -105,16 +79,16 @@ export function Readouts({
   const predicted =
     trial.predicted_error === null || isScored ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
-    <Stack gap={8} className={`${classes["readouts"]} numbers`}>
+    <Stack gap={8} className={classes["readouts"] ?? ""}>
       <dl className={classes["row"]}>
-        <Reading
+        <LabelledValue
           title={stale ? `${reading.title}, last known` : reading.title}
           topic={reading.unit === "m" ? "altitude" : undefined}
           value={withUnit(stale ? lastOutput : output, reading.unit, reading.digits)}
           size="huge"
           stale={stale}
         />
-        <Reading
+        <LabelledValue
           title={`${isScored ? "Error so far" : "Error"}${predicted}`}
           topic={isScored ? "errorSoFar" : "error"}
           value={isFlying && isAborted ? "not scored" : withUnit(error, unit)}
@@ -124,7 +98,7 @@ export function Readouts({
       </dl>
       <dl className={classes["row"]}>
         {hasThrottle && live !== null && (
-          <Reading
+          <LabelledValue
             title={saturated ? "Saturated" : "Throttle"}
             topic="throttle"
             value={percentOrNothing(isFlying ? throttleNow(live, status) : null)}
@@ -132,7 +106,7 @@ export function Readouts({
             stale={stale}
           />
         )}
-        <Reading
+        <LabelledValue
           title={low === "" ? "Battery" : `Battery, ${low}`}
           value={withUnit(batteryV, "V", 1)}
           stale={stale}
@@ -140,10 +114,14 @@ export function Readouts({
         />
         {hasLink && <LinkReading status={status} />}
         {isScored && (
-          <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} stale={stale} />
+          <LabelledValue
+            title="Ends in"
+            value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)}
+            stale={stale}
+          />
         )}
         {!isFlying && (
-          <Reading
+          <LabelledValue
             title={trial.record === null ? "Scored window" : "Record length"}
             value={recordLength(trial, windowS)}
           />
@@ -171,7 +149,7 @@ interface HeldGainsProps {
 /** The gains of the flight, each ticked once it is read back. */
 export function HeldGains({ asked, readBack, held, titles, areSet }: HeldGainsProps) {
   return (
-    <table className={`${classes["gains"]} numbers`}>
+    <table className={classes["gains"]}>
       <caption className="visually-hidden">Gains of this flight, and whether they are set</caption>
       <tbody>
         {gainTicks(asked, readBack, held).map((tick) => (

@@ -274,7 +274,7 @@ function PreflightChecks({ checks }: { checks: readonly CheckItem[] }) {
   if (failed.length === 0) return null;
   return (
     <Aside tone="warn" fz="small">
-      <ul className={classes["checks"]} aria-label="Failed preflight checks">
+      <Stack component="ul" gap={8} className={classes["checks"]} aria-label="Failed preflight checks">
         {failed.map(({ name, title, found, needed, hint }) => (
           <li key={name}>
             <IconAlertTriangle size={18} color="var(--warn)" aria-hidden />
@@ -283,7 +283,7 @@ function PreflightChecks({ checks }: { checks: readonly CheckItem[] }) {
             </span>
           </li>
         ))}
-      </ul>
+      </Stack>
     </Aside>
   );
 }

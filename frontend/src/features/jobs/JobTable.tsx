@@ -149,7 +149,7 @@ export function JobProgress({ job, title }: { job: Job; title: string }) {
         value={Math.floor(100 * (job.done_share ?? 0))}
         max={100}
       />
-      <Note mt={4} fz="small" style={{ overflowWrap: "anywhere" }} className="numbers">
+      <Note mt={4} fz="small" style={{ overflowWrap: "anywhere" }}>
         {progressText(job)}
       </Note>
     </Box>

@@ -102,7 +102,7 @@ function Answer({ title, answer, good, facts, table, label, notes, figures = [],
           {answer}
         </Text>
         {facts.map(([name, values]) => (
-          <Group key={name} component="p" gap="2px 14px" c="dimmed" fz="small" className="numbers">
+          <Group key={name} component="p" gap="2px 14px" c="dimmed" fz="small">
             <b>{name}</b>
             {values.map((fact) => (
               <span key={fact}>{fact}</span>

@@ -1,4 +1,4 @@
-import { Button, Group, Stack, Switch } from "@mantine/core";
+import { Button, Checkbox, Group, Stack } from "@mantine/core";
 import { IconCopy } from "@tabler/icons-react";
 import { useState } from "react";
 import { navigate } from "wouter/use-browser-location";
@@ -41,7 +41,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
       />
       {bestFlight !== null && (
         <Group gap={8} mih={48}>
-          <Switch
+          <Checkbox
             size="md"
             label={`Start from flight ${bestFlight}`}
             checked={warm}

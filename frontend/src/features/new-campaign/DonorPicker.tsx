@@ -75,7 +75,7 @@ export function DonorPicker({ experiment, label, value: donor = null, error, onC
         </ul>
       )}
       {donor?.best && (
-        <Aside tone="good" fz="small" className="numbers">
+        <Aside tone="good" fz="small">
           Best: flight {donor.best.trial_number} on {donor.vehicle.title}:{" "}
           <strong>
             <GainList gains={donor.best.gains} experiment={experiment} />

@@ -1,4 +1,4 @@
-import { Anchor, Button, Group, Input, Radio, SimpleGrid, Text } from "@mantine/core";
+import { Anchor, Box, Button, Group, Input, SimpleGrid, Text } from "@mantine/core";
 import { type ReactNode, useId } from "react";
 import { Link } from "wouter";
 import type { Catalogue, Vehicle } from "../../api/types";
@@ -84,7 +84,17 @@ function VehicleOption({ isReal, checked, name, line, onChoose, children }: Opti
     <label htmlFor={id} className={classes["card"]}>
       <Group justify="space-between">
         <VehicleBadge isReal={isReal} />
-        <Radio id={id} size="md" name="vehicle" checked={checked} onChange={onChoose} />
+        <Box
+          component="input"
+          type="radio"
+          w={24}
+          h={24}
+          m={0}
+          id={id}
+          name="vehicle"
+          checked={checked}
+          onChange={onChoose}
+        />
       </Group>
       <strong>{name}</strong>
       <Text span c="dimmed" fz="small" lh="inherit">

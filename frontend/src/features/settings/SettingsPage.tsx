@@ -1,5 +1,6 @@
 import {
   Anchor,
+  Box,
   Button,
   Checkbox,
   Group,
@@ -202,7 +203,15 @@ function Reachable({ system: { addresses, exposes, host, in_container } }: { sys
         />
       )}
       <Group gap={18}>
-        <img src={codeOf(chosen)} alt={`QR code of ${chosen}`} width={220} height={220} className={classes["code"]} />
+        <Box
+          component="img"
+          src={codeOf(chosen)}
+          alt={`QR code of ${chosen}`}
+          width={220}
+          height={220}
+          bd="1px solid var(--hairline)"
+          bdrs="md"
+        />
         <Note flex="1 1 230px">
           Scan the code with the tablet’s camera, or enter
           <Anchor href={chosen} display="block" py={12} fz="title" fw={650} style={{ overflowWrap: "anywhere" }}>

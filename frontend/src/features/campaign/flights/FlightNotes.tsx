@@ -135,7 +135,7 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
         onChange={({ currentTarget: { value } }) => (value === trial.note ? forget() : setNote(value))}
       />
       {note.length >= COUNTED_FROM && (
-        <p role="status" className="numbers">
+        <p role="status">
           {note.length} of at most {LONGEST_NOTE} characters
         </p>
       )}

@@ -84,7 +84,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
         <VerdictPanel trial={trial.data} trials={trials} pin={pin} />
         <Box px={18} py={4} c="dimmed" fz="small">
           {record !== null && (
-            <p className="numbers">
+            <p>
               {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
               {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>
               {hasSeed && `, seed ${trial.data.seed}`}.

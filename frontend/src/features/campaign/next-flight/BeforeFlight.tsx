@@ -16,11 +16,7 @@ import { isWithdrawnByOperator } from "./nextStep";
 /** One line before a flight: how long it is scored, and so how long it flies. */
 export function FlightWindow({ definition }: { definition: Definition }) {
   const seconds = windowOf(definition, useCatalogue().data);
-  return seconds === null ? null : (
-    <Note fz="small" className="numbers">
-      Scored window: {seconds} s from the takeoff command
-    </Note>
-  );
+  return seconds === null ? null : <Note fz="small">Scored window: {seconds} s from the takeoff command</Note>;
 }
 
 /** The predicted error with its interval. */

@@ -111,7 +111,7 @@ function Result({ campaign, winner, first, comparison }: ResultProps) {
   const change = percentChange(winner.mean, first.mean);
   const standing = campaign.standing && STANDINGS[campaign.standing];
   return (
-    <Aside tone="good" className="numbers">
+    <Aside tone="good">
       <p>Best gains ({flightsText(winner.trial_numbers)})</p>
       <Text fz="var(--text-figure)" fw={650} my={4} lh="inherit">
         {plusMinus(winner.mean, winner.standard_error, unit)}

@@ -46,7 +46,7 @@ export function FlyingCard({ campaign, trials, flight }: Props) {
       tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
     >
       <Stack gap={14}>
-        <dl className={`${classes["values"]} ${classes["live"]} numbers`}>
+        <dl className={`${classes["values"]} ${classes["live"]}`}>
           <LabelledValue
             title={isStale ? `${reading.title}, last known` : reading.title}
             value={withUnit(outputNow(live, status), reading.unit, reading.digits)}
@@ -68,7 +68,7 @@ export function FlyingCard({ campaign, trials, flight }: Props) {
           )}
         </dl>
         {trial && (
-          <Note fz="body" className="numbers">
+          <Note fz="body">
             <GainList gains={trial.gains} experiment={campaign.definition.experiment} />
             {trial.read_back && ", read back from the vehicle"}
           </Note>

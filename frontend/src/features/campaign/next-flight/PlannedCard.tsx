@@ -34,7 +34,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
   return (
     <Panel title={`Flight ${trial.number} is planned`} tools={<FlightMarkers trial={trial} />}>
       <Stack gap={14}>
-        <dl className={`${classes["values"]} numbers`}>
+        <dl className={classes["values"]}>
           {Object.entries(trial.gains).map(([name, value]) => (
             <LabelledValue
               key={name}
@@ -48,7 +48,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           ))}
         </dl>
         {trial.predicted_error !== null && (
-          <dl className={`${classes["values"]} numbers`}>
+          <dl className={classes["values"]}>
             <LabelledValue title="Predicted error" value={<Predicted trial={trial} unit={unit} />} />
           </dl>
         )}

@@ -36,7 +36,7 @@ export function GateChecks({ gate }: { gate: Gate | null }) {
               <Icon size={19} color={color} aria-label={result} />
               <div>
                 {check.sentence}
-                <Note fz="fine" lh="inherit" className="numbers">
+                <Note fz="fine" lh="inherit">
                   {factsOf(check)}
                 </Note>
               </div>

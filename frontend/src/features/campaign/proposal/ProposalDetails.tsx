@@ -47,7 +47,7 @@ export function PredictedError({ prediction, best, bestTitle, source, unit, hasM
     );
   }
   return (
-    <div className={`${classes["predicted"]} numbers`} aria-busy={!isCurrent}>
+    <div className={classes["predicted"]} aria-busy={!isCurrent}>
       <Group gap={6} wrap="nowrap">
         {isCurrent ? "Predicted error" : "Updating…"}
         <HelpTip topic="predicted" />
@@ -140,7 +140,7 @@ export function ProposalDetails({ proposal, campaignId, said, unit, hasModel }: 
             </span>
           )}
           {trust !== null && (
-            <span className="numbers">
+            <span>
               Trust region: {percent(trust)} of each gain's range
               <HelpTip topic="trustRegion" />
             </span>
@@ -167,7 +167,7 @@ function withOwnUnit(text: string, unit: string): string {
 /** Fitted parameters of the vehicle, next to their values before the flights. */
 function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   return (
-    <div className="numbers">
+    <div>
       <Note fz="fine">
         Fitted parameters (± standard error) <HelpTip topic="fitted" />
       </Note>
@@ -202,7 +202,7 @@ function Tried({ explanation, unit, gains }: TriedProps) {
   return (
     <More summary={ladder.length > 0 ? "Steps evaluated on the model" : "Gradient of the error"}>
       {slopes.length > 0 && (
-        <span className="numbers">
+        <span>
           Gradient of the error:{" "}
           {slopes.map(([name, value]) => `${name} ${trueMinus(value.toPrecision(2))}`).join(", ")} {unit} per unit of
           the gain. <HelpTip topic="gradient" />

@@ -77,7 +77,7 @@ interface FactProps {
 /** One result, and what follows from it. */
 function Fact({ title, topic, tone, value, remark, children }: FactProps) {
   return (
-    <Aside tone={tone} fz="body" lh={1.4} className="numbers">
+    <Aside tone={tone} fz="body" lh={1.4}>
       <Text component="h3" c="dimmed" fz="small" fw={550}>
         {title} {topic && <HelpTip topic={topic} />}
       </Text>

@@ -91,7 +91,7 @@ export function VerdictPanel({ trial, trials, pin }: Props) {
           <strong>Refused by the gate, overruled:</strong> {trial.overrule_reason}
         </Aside>
       )}
-      <dl className={`${classes["figures"]} numbers`}>
+      <dl className={classes["figures"]}>
         <LabelledValue
           title="Error"
           topic="error"
@@ -196,7 +196,7 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
   if (trial.comparisons.length === 0) return null;
   const asked = repeatPurpose(trial) !== "";
   return (
-    <Stack component="ul" gap={4} mt={8} fz="body" lh={1.4} className="numbers">
+    <Stack component="ul" gap={4} mt={8} fz="body" lh={1.4}>
       {trial.comparisons.map(({ against, trial_number, verdict, confidence, difference, standard_error }) => {
         const { word, Icon, color } = VERDICTS[verdict];
         return (
@@ -236,7 +236,7 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
       </h3>
       <ul>
         {glitches.map(({ kind, start_s, end_s, sentence }) => (
-          <li key={`${kind} ${start_s}`} className="numbers">
+          <li key={`${kind} ${start_s}`}>
             <strong>
               {KINDS[kind]}, {start_s.toFixed(2)} … {end_s.toFixed(2)} s.
             </strong>{" "}
@@ -245,7 +245,7 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
         ))}
       </ul>
       {trial.repaired_error !== null && (
-        <p className="numbers">
+        <p>
           Error as recorded <span className="quantity">{plusMinus(trial.error, null, unit)}</span>, with the glitches
           interpolated <span className="quantity">{plusMinus(trial.repaired_error, null, unit)}</span>.
         </p>
