@@ -60,7 +60,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
-      <div className={classes["next"]}>
+      <Stack gap={10} className={classes["next"]}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable
@@ -101,7 +101,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           upload={upload}
           isSecondary={isSecondary}
         />
-      </div>
+      </Stack>
       <Stack gap={10} mt={10}>
         <div>
           {chosen.choice?.proposed && (
