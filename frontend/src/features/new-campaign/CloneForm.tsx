@@ -9,7 +9,7 @@ import { useVehicles } from "../../api/vehicles";
 import { SelectField } from "../../ui/Fields";
 import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
-import { kindsFor, registeredFor } from "./newCampaign";
+import { choicesOf, kindsFor, registeredFor } from "./newCampaign";
 
 interface Props extends Pick<Campaign, "id" | "vehicle"> {
   experiment: string;
@@ -32,10 +32,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
     <Stack gap={8}>
       <SelectField
         label="Clone to vehicle"
-        data={[
-          ...registered.map(({ id, name }) => ({ value: String(id), label: name })),
-          ...kinds.map(({ name, title }) => ({ value: name, label: title })),
-        ]}
+        data={[...registered.map(({ id, name }) => ({ value: String(id), label: name })), ...choicesOf(kinds)]}
         value={vehicle}
         onChange={setVehicle}
       />

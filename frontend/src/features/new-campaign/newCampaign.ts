@@ -67,6 +67,11 @@ export function kindsFor(catalogue: Catalogue, experiment: string): VehicleKindI
   return shared.sort((one, other) => rank(one) - rank(other));
 }
 
+/** Entries of the catalogue as choices of a field. */
+export function choicesOf(entries: readonly { name: string; title: string }[]) {
+  return entries.map(({ name, title }) => ({ value: name, label: title }));
+}
+
 /** Registered vehicles that fly this experiment. */
 export function registeredFor(vehicles: readonly Vehicle[], experiment: string): Vehicle[] {
   return vehicles.filter(({ registered, experiments }) => registered && fits(experiments, experiment));
