@@ -50,7 +50,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
             lh="inherit"
             c={campaign.verdict === "better" ? "var(--best)" : "dimmed"}
           >
-            {progress(campaign) ?? " "}
+            {progress(campaign)}
           </Text>
         </Group>
       </Stack>

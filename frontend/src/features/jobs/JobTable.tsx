@@ -1,4 +1,4 @@
-import { Anchor, Box, Button, Stack, Text } from "@mantine/core";
+import { Anchor, Box, Button, Text } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { type Job, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
@@ -169,14 +169,14 @@ function JobLog({ job }: { job: Job }) {
           The last {lines.length} of {total} lines:
         </Note>
       )}
-      <Stack component="ol" gap={4} fz="small" lh={1.4} className={classes["lines"]}>
+      <ol className={classes["lines"]}>
         {lines.map(({ at, level, message, details, exception }) => {
           const more = Object.entries(details).map(([name, value]) => `${name} ${value}`);
           return (
             <li key={`${at} ${message}`} data-level={level}>
-              <Box component="time" c="dimmed" dateTime={at} title={utcTime(at)}>
+              <time dateTime={at} title={utcTime(at)}>
                 {new Date(at).toLocaleTimeString()}
-              </Box>{" "}
+              </time>{" "}
               {level !== "info" && <strong>{level}: </strong>}
               {message}
               {more.length > 0 && (
@@ -189,7 +189,7 @@ function JobLog({ job }: { job: Job }) {
             </li>
           );
         })}
-      </Stack>
+      </ol>
     </>
   );
 }

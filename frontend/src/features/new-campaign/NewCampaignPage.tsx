@@ -2,7 +2,6 @@ import { Button, SimpleGrid, TextInput } from "@mantine/core";
 import { useForm } from "@mantine/form";
 import { IconPlus } from "@tabler/icons-react";
 import { useSearchParams } from "wouter";
-import { navigate } from "wouter/use-browser-location";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue, NewCampaign, Vehicle } from "../../api/types";
@@ -20,6 +19,7 @@ import {
   type CampaignForm,
   choicesOf,
   gainsOf,
+  openCampaign,
   presetOf,
   requestFrom,
   STARTS,
@@ -102,7 +102,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       form={form}
       labels={{ ...plain, ...advanced }}
       request={create}
-      onDone={({ id }) => navigate(`/campaigns/${id}`)}
+      onDone={openCampaign}
       actions={
         <div className={classes["create"]}>
           <MissingEntries numbers={unread} texts={Object.values(missing)} />

@@ -44,7 +44,7 @@ function Results(all: CampaignStatistics) {
         <Scatter {...all} />
         <Predictions record={record} />
       </SimpleGrid>
-      <Stack gap={14} flex="999 1 680px" miw={0}>
+      <Stack gap={14} flex="999 1 680px">
         <Groups {...all} />
         <Stack component="ul" gap={4} pl={20} c="dimmed" fz="small" lh={1.45}>
           {drift && (
