@@ -25,6 +25,8 @@ export interface ChartProps {
   label: string;
   /** In pixels; null fills the container. */
   height: number | null;
+  /** Where the screen is too narrow for that height. */
+  tallest?: string;
   liveTrial?: number | null | undefined;
   onChoose?: ((trial: number) => void) | undefined;
   /** Called with the x value that is clicked. */
@@ -64,6 +66,7 @@ export function Chart({
   figure,
   label,
   height,
+  tallest = "96vw",
   liveTrial = null,
   onChoose,
   onPlace,
@@ -174,7 +177,7 @@ export function Chart({
       role="group"
       aria-label={label}
       pos="relative"
-      style={{ height: height === null ? "100%" : `min(${height}px, var(--tallest, 96vw))` }}
+      style={{ height: height === null ? "100%" : `min(${height}px, ${tallest})` }}
     >
       {broken !== null && (
         <Text p={24} c="var(--bad)">

@@ -1,8 +1,8 @@
 import type { SparkCurve } from "../api/types";
 import { count } from "../ui/format";
-import classes from "./Sparkline.module.css";
 
 const BOX = { width: 300, height: 84 };
+const PEN = { vectorEffect: "non-scaling-stroke" };
 
 function points(curve: SparkCurve): Point[] {
   return curve.time_s.map((time, index) => [time, curve.values[index] ?? 0]);
@@ -21,17 +21,21 @@ export function Sparkline({ curves, setPoint }: { curves: readonly SparkCurve[];
   return (
     <svg
       viewBox={`0 0 ${BOX.width} ${BOX.height}`}
-      className={classes["spark"]}
+      width="100%"
+      height={BOX.height}
+      fill="none"
       preserveAspectRatio="none"
       role="img"
       aria-label={curves.length === 0 ? "No flights yet" : `Curves of ${count(curves.length, "flight")}`}
     >
-      <line x1={0} x2={BOX.width} y1={target} y2={target} className={classes["target"]} />
+      <line x2={BOX.width} y1={target} y2={target} {...PEN} stroke="var(--edge)" strokeDasharray="2 4" />
       {ordered.map((curve) => (
         <path
           key={curve.trial_number}
           d={path(curve.points, scale, BOX)}
-          className={curve.best ? classes["best"] : classes["earlier"]}
+          {...PEN}
+          stroke={curve.best ? "var(--best)" : "var(--earlier)"}
+          strokeWidth={curve.best ? 2.75 : 1.25}
         />
       ))}
     </svg>

@@ -10,6 +10,7 @@ import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
+import { choicesOf } from "../new-campaign/newCampaign";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
 import { STATES, type StateFilter } from "./campaignList";
@@ -69,10 +70,7 @@ export function CampaignListPage() {
           flex="9 1 150px"
           maw={200}
           aria-label="Vehicle"
-          data={[
-            { value: "", label: "All vehicles" },
-            ...kinds.map(({ name, title }) => ({ value: name, label: title })),
-          ]}
+          data={[{ value: "", label: "All vehicles" }, ...choicesOf(kinds)]}
           value={vehicle}
           onChange={setVehicle}
         />

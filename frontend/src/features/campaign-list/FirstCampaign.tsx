@@ -1,14 +1,13 @@
 import { Anchor, Box, Button, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link } from "wouter";
-import { navigate } from "wouter/use-browser-location";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import panel from "../../ui/Panel.module.css";
 import page from "../campaign/CampaignPage.module.css";
-import { firstPreset } from "../new-campaign/newCampaign";
+import { firstPreset, openCampaign } from "../new-campaign/newCampaign";
 import { ImportBundle } from "./ImportBundle";
 
 const STEPS = [
@@ -55,9 +54,7 @@ export function FirstCampaign() {
         loading={create.isPending}
         disabled={preset === undefined}
         leftSection={<IconPlus size={22} aria-hidden />}
-        onClick={() =>
-          preset && create.mutate(preset.campaign, { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) })
-        }
+        onClick={() => preset && create.mutate(preset.campaign, { onSuccess: openCampaign })}
       >
         Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”
       </Button>

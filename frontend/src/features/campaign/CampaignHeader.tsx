@@ -26,11 +26,11 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const replacement = catalogue && replacementOf(catalogue, campaign.definition.experiment);
   return (
     <Box component="header" mb={14}>
-      <Group gap="0 16px" className={renaming ? "" : classes["heading"]}>
+      <Group gap="0 16px">
         {renaming ? (
           <Rename campaign={campaign} onClose={() => setRenaming(false)} />
         ) : (
-          <Group gap={4} wrap="nowrap" miw={0}>
+          <Group gap={4} wrap="nowrap" flex="1 1 300px" miw={0}>
             <Title order={1} lh={1.2} className={classes["name"]} title={campaign.name}>
               {campaign.name}
             </Title>

@@ -1,4 +1,4 @@
-import { ActionIcon, Anchor, Group, Text } from "@mantine/core";
+import { ActionIcon, Anchor, Box, Group } from "@mantine/core";
 import { IconArrowBarToUp, IconX } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
@@ -95,9 +95,9 @@ function Name({ flight, several, pen }: { flight: ComparedFlight; several: boole
           Flight {number}
         </Anchor>
         {several && (
-          <Text component="small" fz="fine" c="dimmed" maw={170} style={{ whiteSpace: "normal" }}>
+          <Box component="small" maw={170} style={{ whiteSpace: "normal" }}>
             {campaign_name}
-          </Text>
+          </Box>
         )}
         <small>
           <VehicleBadge isReal={is_real} />
@@ -191,7 +191,9 @@ export function SettingsTable({ comparison: { flights, settings } }: { compariso
       {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
       {somewhere.length > 0 && (
         <details>
-          <summary>{count(somewhere.length, "setting")} present in only some flights</summary>
+          <Box component="summary" fz="body">
+            {count(somewhere.length, "setting")} present in only some flights
+          </Box>
           <Settings flights={flights} settings={somewhere} title="Settings present in only some flights" />
         </details>
       )}

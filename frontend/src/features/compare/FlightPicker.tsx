@@ -1,8 +1,9 @@
-import { Text, TextInput } from "@mantine/core";
+import { Box, SimpleGrid, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useCampaign, useCampaigns, useTrials } from "../../api/queries";
+import form from "../../ui/Form.module.css";
 import { count, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
@@ -83,9 +84,9 @@ function Campaign({ name, flights, open = false, ...listed }: CampaignProps) {
     >
       <summary>
         {name}
-        <Text component="small" c="dimmed" fz="fine" fw={550} ml="auto" pl={6}>
+        <Box component="small" fw={550} ml="auto" pl={6}>
           {count(flights, "flight")}
-        </Text>
+        </Box>
       </summary>
       {opened && <Flights {...listed} />}
     </details>
@@ -102,12 +103,12 @@ function Flights({
   const unit = useUnits(experiment).error;
   if (trials.data === undefined) return <ErrorNotice error={trials.error} />;
   return (
-    <ul className={classes["flights"]}>
+    <SimpleGrid component="ul" minColWidth="min(270px, 100%)" spacing={16} verticalSpacing={0}>
       {trials.data
         .filter(({ state }) => wasFlown(state))
         .map(({ id, number, state, error, gains }) => (
           <li key={id}>
-            <label>
+            <label className={form["tick"]}>
               <input
                 type="checkbox"
                 checked={chosen.includes(id)}
@@ -116,12 +117,12 @@ function Flights({
               />
               <span>
                 <strong>Flight {number}</strong>{" "}
-                {error === null ? trialStateLabel(state).word.toLowerCase() : withUnit(error, unit)}{" "}
+                {error === null ? trialStateLabel(state).word.toLowerCase() : withUnit(error, unit)} <br />
                 <small>{gainsInBrackets(gains)}</small>
               </span>
             </label>
           </li>
         ))}
-    </ul>
+    </SimpleGrid>
   );
 }

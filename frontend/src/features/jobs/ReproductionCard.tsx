@@ -21,6 +21,7 @@ import { comparedColumns, duration, isUnderWay, measure, ratioSpan } from "./job
 import classes from "./ReproductionCard.module.css";
 
 const FIGURE_HEIGHT_PX = 360;
+const PROSE = { maw: "90ch", lh: 1.45, mb: 8 };
 
 /** One experiment of the paper: published and own results, and figures. */
 export function ReproductionCard({ reproduction }: { reproduction: ReproductionSummary }) {
@@ -30,10 +31,10 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
   return (
     <Box component="article" id={name} display="grid" miw={0} style={{ gap: "var(--gap)" }} aria-label={title}>
       <Panel title={title} tools={<Actions reproduction={reproduction} />}>
-        <Text maw="90ch" lh={1.45} mb={8}>
+        <Text {...PROSE}>
           <strong>In the paper:</strong> {paper}
         </Text>
-        <Text maw="90ch" lh={1.45} mb={8}>
+        <Text {...PROSE}>
           <strong>In Gainline:</strong> {line}
           {span !== null && <> Results: {span}.</>}
         </Text>
@@ -107,11 +108,7 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
   return (
     <>
       {job !== null && isUnderWay(job) && <JobProgress job={job} title={`Progress: ${title}`} />}
-      {job?.state === "cancelled" && (
-        <Text maw="90ch" lh={1.45} mb={8}>
-          The last run was cancelled.
-        </Text>
-      )}
+      {job?.state === "cancelled" && <Text {...PROSE}>The last run was cancelled.</Text>}
       {job?.problem && (
         <Aside tone="bad" fz="body" role="alert">
           <strong>The last run failed: {job.problem.title}</strong>

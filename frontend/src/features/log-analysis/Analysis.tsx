@@ -9,7 +9,6 @@ import { DataTable } from "../../ui/DataTable";
 import { gainText, stopped } from "../../ui/format";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
-import classes from "./LogAnalysis.module.css";
 import { StartCampaign } from "./StartCampaign";
 
 const FIGURE_HEIGHT_PX = 560;
@@ -119,14 +118,17 @@ function Answer({ title, answer, good, facts, table, label, notes, figures = [],
           {children}
         </Group>
       </Panel>
-      <SimpleGrid
-        className={classes["figures"]}
-        type="container"
-        cols={{ base: 1, "860px": figures.length }}
-        spacing="var(--gap)"
-      >
+      <SimpleGrid type="container" cols={{ base: 1, "860px": figures.length }} spacing="var(--gap)">
         {figures.map((card) => (
-          <FigurePanel key={card.title} title={card.title} card={card} error={null} height={FIGURE_HEIGHT_PX} />
+          // As high on a phone, so that the titles of the axes have room.
+          <FigurePanel
+            key={card.title}
+            title={card.title}
+            card={card}
+            error={null}
+            height={FIGURE_HEIGHT_PX}
+            tallest="400vw"
+          />
         ))}
       </SimpleGrid>
     </>

@@ -1,7 +1,6 @@
 import { Button, Checkbox, Group, Stack } from "@mantine/core";
 import { IconCopy } from "@tabler/icons-react";
 import { useState } from "react";
-import { navigate } from "wouter/use-browser-location";
 import { useClone } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
@@ -9,7 +8,7 @@ import { useVehicles } from "../../api/vehicles";
 import { SelectField } from "../../ui/Fields";
 import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
-import { kindsFor, registeredFor } from "./newCampaign";
+import { choicesOf, kindsFor, openCampaign, registeredFor } from "./newCampaign";
 
 interface Props extends Pick<Campaign, "id" | "vehicle"> {
   experiment: string;
@@ -32,10 +31,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
     <Stack gap={8}>
       <SelectField
         label="Clone to vehicle"
-        data={[
-          ...registered.map(({ id, name }) => ({ value: String(id), label: name })),
-          ...kinds.map(({ name, title }) => ({ value: name, label: title })),
-        ]}
+        data={[...registered.map(({ id, name }) => ({ value: String(id), label: name })), ...choicesOf(kinds)]}
         value={vehicle}
         onChange={setVehicle}
       />
@@ -58,7 +54,7 @@ export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: 
           // The same vehicle keeps its settings, another one starts from its own defaults.
           clone.mutate(
             { warm_start: warm, vehicle: vehicle === ownKey ? undefined : choice },
-            { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
+            { onSuccess: openCampaign },
           )
         }
       >

@@ -7,7 +7,6 @@ import { Aside } from "../../ui/Aside";
 import { GainList } from "../../ui/gains";
 import { plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
-import classes from "./NewCampaign.module.css";
 
 interface Props {
   experiment: string;
@@ -59,7 +58,15 @@ export function DonorPicker({ experiment, label, value: donor = null, error, onC
         </p>
       )}
       {donor === null && usable.length > 0 && (
-        <ul className={classes["offers"]} aria-label="Campaigns to start from">
+        <Stack
+          component="ul"
+          gap={0}
+          p={4}
+          bd="1px solid var(--hairline)"
+          bdrs="md"
+          bg="var(--surface)"
+          aria-label="Campaigns to start from"
+        >
           {usable.slice(0, OFFERED).map((campaign) => (
             <li key={campaign.id}>
               <Button variant="subtle" c="inherit" fw={400} fullWidth justify="start" onClick={() => choose(campaign)}>
@@ -72,7 +79,7 @@ export function DonorPicker({ experiment, label, value: donor = null, error, onC
               Keep typing to narrow the list.
             </Text>
           )}
-        </ul>
+        </Stack>
       )}
       {donor?.best && (
         <Aside tone="good" fz="small">

@@ -2,7 +2,6 @@ import { Button, SimpleGrid, TextInput } from "@mantine/core";
 import { useForm } from "@mantine/form";
 import { IconPlus } from "@tabler/icons-react";
 import { useSearchParams } from "wouter";
-import { navigate } from "wouter/use-browser-location";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue, NewCampaign, Vehicle } from "../../api/types";
@@ -18,7 +17,9 @@ import { DonorPicker } from "./DonorPicker";
 import { advancedTitle, fieldsOf, unreadable } from "./fields";
 import {
   type CampaignForm,
+  choicesOf,
   gainsOf,
+  openCampaign,
   presetOf,
   requestFrom,
   STARTS,
@@ -89,7 +90,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   });
 
   const preset = presetOf(form.values, catalogue);
-  const presets = catalogue.presets.map(({ name, title }) => ({ value: name, label: title }));
+  const presets = choicesOf(catalogue.presets);
   const strategies = strategiesFor(catalogue, definition.experiment);
   const strategy = strategies.find(({ name }) => name === definition.strategy);
   const unread = unreadable(form.values, (path) => form.getInputProps(path).value, catalogue);
@@ -101,7 +102,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       form={form}
       labels={{ ...plain, ...advanced }}
       request={create}
-      onDone={({ id }) => navigate(`/campaigns/${id}`)}
+      onDone={openCampaign}
       actions={
         <div className={classes["create"]}>
           <MissingEntries numbers={unread} texts={Object.values(missing)} />
@@ -130,7 +131,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       {catalogue.experiments.length > 1 && (
         <SelectField
           {...field("definition.experiment")}
-          data={offeredExperiments(catalogue).map(({ name, title }) => ({ value: name, label: title }))}
+          data={choicesOf(offeredExperiments(catalogue))}
           onChange={(value) => form.setValues(withExperiment(form.values, catalogue, value))}
         />
       )}
@@ -156,7 +157,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         <SelectField
           {...field("definition.strategy")}
           description={`${strategies.length > 1 && strategy === strategies[0] ? "Recommended. " : ""}${strategy?.line ?? ""}`}
-          data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
+          data={choicesOf(strategies)}
           onChange={(value) => {
             form.setFieldValue("definition.strategy", value);
             form.setFieldValue("definition.options", {});

@@ -1,5 +1,5 @@
-import { Anchor, Box, Button, Group, Input, SimpleGrid, Text } from "@mantine/core";
-import { type ReactNode, useId } from "react";
+import { Anchor, Box, Button, Group, Input, SimpleGrid, Stack, Text } from "@mantine/core";
+import type { ReactNode } from "react";
 import { Link } from "wouter";
 import type { Catalogue, Vehicle } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
@@ -79,28 +79,17 @@ interface OptionProps {
 }
 
 function VehicleOption({ isReal, checked, name, line, onChoose, children }: OptionProps) {
-  const id = useId();
   return (
-    <label htmlFor={id} className={classes["card"]}>
+    <Stack component="label" gap={6} mih={128} p="14px 16px" lh={1.35} className={classes["card"]}>
       <Group justify="space-between">
         <VehicleBadge isReal={isReal} />
-        <Box
-          component="input"
-          type="radio"
-          w={24}
-          h={24}
-          m={0}
-          id={id}
-          name="vehicle"
-          checked={checked}
-          onChange={onChoose}
-        />
+        <Box component="input" type="radio" w={24} h={24} m={0} name="vehicle" checked={checked} onChange={onChoose} />
       </Group>
       <strong>{name}</strong>
       <Text span c="dimmed" fz="small" lh="inherit">
         {line}
       </Text>
       {children}
-    </label>
+    </Stack>
   );
 }

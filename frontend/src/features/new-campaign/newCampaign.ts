@@ -3,6 +3,7 @@
  * until it is a valid number.
  */
 
+import { navigate } from "wouter/use-browser-location";
 import type {
   CampaignSummary,
   Catalogue,
@@ -65,6 +66,14 @@ export function kindsFor(catalogue: Catalogue, experiment: string): VehicleKindI
   const rank = (kind: VehicleKindInfo): number => (kind.name === "jsbsim" ? 0 : kind.can_fly ? 1 : 2);
   const shared = catalogue.vehicle_kinds.filter((kind) => !kind.registered && fits(kind.experiments, experiment));
   return shared.sort((one, other) => rank(one) - rank(other));
+}
+
+/** Opens the page of a campaign that has been created. */
+export const openCampaign = ({ id }: { id: number }) => navigate(`/campaigns/${id}`);
+
+/** Entries of the catalogue as choices of a field. */
+export function choicesOf(entries: readonly { name: string; title: string }[]) {
+  return entries.map(({ name, title }) => ({ value: name, label: title }));
 }
 
 /** Registered vehicles that fly this experiment. */

@@ -66,7 +66,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
           card={figure.data}
           error={figure.error}
           height={recordHeight(figure.data)}
-          className={page["tall"]}
+          tallest="400vw"
           onPlace={pinning ? place : undefined}
           tools={
             record !== null && (

@@ -5,6 +5,7 @@ import { memo, useEffect, useMemo, useRef } from "react";
 import { Link } from "wouter";
 import type { Campaign, Trial } from "../../../api/types";
 import { onPointed, pointAt } from "../../../charts/pointing";
+import form from "../../../ui/Form.module.css";
 import { count } from "../../../ui/format";
 import { type Column, ListTable } from "../../../ui/ListTable";
 import { Note } from "../../../ui/Note";
@@ -86,7 +87,7 @@ function TrialsTable({ campaign, trials, shown, unit, onChoose, selected, onSele
       className: classes["pick"],
       cell: ({ id, number, state }) =>
         wasFlown(state) && (
-          <label>
+          <label className={form["tick"]}>
             <input
               type="checkbox"
               aria-label={`Select flight ${number}`}

@@ -1,6 +1,5 @@
 import { Anchor, Button, Stack } from "@mantine/core";
 import { Link } from "wouter";
-import { navigate } from "wouter/use-browser-location";
 import { useRehearse } from "../../../api/mutations";
 import type { Campaign } from "../../../api/types";
 import { Aside } from "../../../ui/Aside";
@@ -8,6 +7,7 @@ import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
 import { Panel } from "../../../ui/Panel";
 import { useHasModel } from "../../../ui/units";
+import { openCampaign } from "../../new-campaign/newCampaign";
 import page from "../CampaignPage.module.css";
 
 /** Next action of a real vehicle's campaign that has not passed its rehearsal. */
@@ -36,7 +36,7 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
           <Button
             fullWidth
             loading={rehearse.isPending}
-            onClick={() => rehearse.mutate(undefined, { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) })}
+            onClick={() => rehearse.mutate(undefined, { onSuccess: openCampaign })}
           >
             Rehearse on a simulation
           </Button>

@@ -1,6 +1,7 @@
-import { Text, TextInput } from "@mantine/core";
+import { Box, Text, TextInput } from "@mantine/core";
 import { Fragment } from "react";
 import { gainText } from "../../../ui/format";
+import list from "../../../ui/ListTable.module.css";
 import { changeText, type GainRow, placeIn, sliderStep } from "./gainRows";
 import classes from "./Proposal.module.css";
 
@@ -24,7 +25,7 @@ interface Props {
 /** Gains of the best flight, else the vehicle's safe ones, and next, with the change of each as a factor and within the bounds. */
 export function GainTable({ rows, from, unit, entry }: Props) {
   return (
-    <table className={classes["gains"]}>
+    <table className={`${list["list"]} ${classes["gains"]}`}>
       <caption className="visually-hidden">{from} and next gains</caption>
       <thead>
         <tr>
@@ -40,16 +41,44 @@ export function GainTable({ rows, from, unit, entry }: Props) {
           <tbody key={name}>
             <tr>
               <th scope="row" title={title}>
-                <GainName name={name} /> {title && <small>{title}</small>}
+                {/* A long name breaks after an underscore. */}
+                {name.split(/(?<=_)/).map((part) => (
+                  <Fragment key={part}>
+                    {part}
+                    <wbr />
+                  </Fragment>
+                ))}{" "}
+                {title && (
+                  <Box component="small" fw={550}>
+                    {title}
+                  </Box>
+                )}
               </th>
-              <td title={String(now)}>{gainText(now)}</td>
-              <td title={next === null ? undefined : String(next)}>
-                {entry === undefined ? next !== null && gainText(next) : <NextInput name={name} {...entry} />}
-              </td>
-              <td data-same={next === now || undefined}>{next !== null && changeText(now, next)}</td>
+              <Box component="td" c="dimmed" title={String(now)}>
+                {gainText(now)}
+              </Box>
+              <Box component="td" fz="title" fw={650} title={next?.toString()}>
+                {entry ? (
+                  <TextInput
+                    aria-label={name}
+                    w="clamp(80px, 20cqi, 96px)"
+                    ml="auto"
+                    inputMode="decimal"
+                    autoComplete="off"
+                    value={entry.texts[name] ?? ""}
+                    error={name in entry.reasons || entry.refused.includes(name)}
+                    onChange={(event) => entry.onText(name, event.currentTarget.value)}
+                  />
+                ) : (
+                  next !== null && gainText(next)
+                )}
+              </Box>
+              <Box component="td" fz="small" c={next === now ? "dimmed" : ""}>
+                {next !== null && changeText(now, next)}
+              </Box>
             </tr>
             <tr>
-              <td colSpan={4}>
+              <td colSpan={4} className={list["below"]}>
                 <Bounds row={row} onText={entry?.onText} />
                 {entry?.reasons[name] && (
                   <Text c="error" fz="fine" ta="left" role="alert">
@@ -65,48 +94,27 @@ export function GainTable({ rows, from, unit, entry }: Props) {
   );
 }
 
-/** A long name breaks after an underscore. */
-function GainName({ name }: { name: string }) {
-  return name.split("_").map((part, index) => (
-    <Fragment key={part}>
-      {index > 0 && "_"}
-      {index > 0 && <wbr />}
-      {part}
-    </Fragment>
-  ));
-}
-
-function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name: string }) {
-  return (
-    <TextInput
-      aria-label={name}
-      className={classes["entry"]}
-      inputMode="decimal"
-      autoComplete="off"
-      value={texts[name] ?? ""}
-      error={reasons[name] !== undefined || refused.includes(name)}
-      onChange={(event) => onText(name, event.currentTarget.value)}
-    />
-  );
-}
-
-/** The old and the new gain on a scale of the bounds; a slider where the gain may be changed. */
+/** The old gain, a tick, and the new one, a dot, on a scale of the bounds; a slider where the gain may be changed. */
 function Bounds({ row, onText }: { row: GainRow; onText: GainEntry["onText"] | undefined }) {
   const { name, title, now, next, bounds } = row;
   if (bounds === null) return null;
   const [from, to] = [placeIn(bounds, now), placeIn(bounds, next ?? now)];
   return (
     <div className={classes["bounds"]}>
-      <small className={classes["title"]} aria-hidden>
-        {title}
-      </small>
+      {onText === undefined && (
+        <small className={classes["title"]} aria-hidden>
+          {title}
+        </small>
+      )}
       <small>{gainText(bounds[0])}</small>
       <div className={classes["scale"]}>
-        <span style={{ insetInlineStart: `${Math.min(from, to)}%`, width: `${Math.abs(to - from)}%` }} />
-        <span className={classes["was"]} style={{ insetInlineStart: `${from}%` }} />
-        {onText === undefined ? (
-          <span className={classes["becomes"]} style={{ insetInlineStart: `${to}%` }} />
-        ) : (
+        <svg width="100%" height={16} overflow="visible" strokeWidth={4} aria-hidden>
+          <line x2="100%" y1={8} y2={8} stroke="var(--hairline)" />
+          <line x1={`${from}%`} x2={`${to}%`} y1={8} y2={8} stroke="var(--prediction)" />
+          <line x1={`${from}%`} x2={`${from}%`} y2={16} stroke="var(--edge)" strokeWidth={3} />
+          {onText === undefined && <circle cx={`${to}%`} cy={8} r={7} fill="var(--prediction)" />}
+        </svg>
+        {onText && (
           <input
             type="range"
             aria-label={`Slider for ${name}`}

@@ -2,7 +2,6 @@ import { useState } from "react";
 import { useLandscape } from "../../../api/queries";
 import type { FigureCard } from "../../../api/types";
 import { FigurePanel } from "../../../charts/FigurePanel";
-import page from "../CampaignPage.module.css";
 import { More } from "./More";
 
 const SLICE_PX = 330;
@@ -28,7 +27,7 @@ export function Landscape({ campaignId }: { campaignId: number }) {
           error={error}
           height={heightOf(card)}
           build="contours"
-          className={page["tall"]}
+          tallest="400vw"
         />
       )}
     </More>

@@ -60,7 +60,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
-      <div className={classes["next"]}>
+      <Stack gap={10} className={classes["next"]}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable
@@ -93,15 +93,8 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         </Stack>
         <ErrorNotice error={formProblem(chosen.error, labels)} shown={Object.keys(labels)} />
         {refusal && <GateRefusal gate={refusal} onUse={chosen.entry && chosen.use} />}
-        <FlightButtons
-          campaign={campaign}
-          proposal={proposal}
-          chosen={chosen}
-          number={number}
-          upload={upload}
-          isSecondary={isSecondary}
-        />
-      </div>
+        <FlightButtons {...{ campaign, proposal, chosen, number, upload, isSecondary }} />
+      </Stack>
       <Stack gap={10} mt={10}>
         <div>
           {chosen.choice?.proposed && (

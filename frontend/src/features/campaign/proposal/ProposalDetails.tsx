@@ -47,23 +47,27 @@ export function PredictedError({ prediction, best, bestTitle, source, unit, hasM
     );
   }
   return (
-    <div className={classes["predicted"]} aria-busy={!isCurrent}>
+    <Group
+      gap="0 10px"
+      align="baseline"
+      justify="space-between"
+      className={classes["predicted"] ?? ""}
+      aria-busy={!isCurrent}
+    >
       <Group gap={6} wrap="nowrap">
         {isCurrent ? "Predicted error" : "Updating…"}
         <HelpTip topic="predicted" />
       </Group>
-      <span>
-        <strong className="quantity">{withUnit(error, unit)}</strong>
-        {interval && (
-          <small>
-            {intervalText(interval, unit)}
-            <HelpTip topic="interval" />
-          </small>
-        )}
-        {isCurrent && source && <small>{source}</small>}
-        {change !== null && <small>{against(change, bestTitle)}</small>}
-      </span>
-    </div>
+      <strong className="quantity">{withUnit(error, unit)}</strong>
+      {interval && (
+        <small>
+          {intervalText(interval, unit)}
+          <HelpTip topic="interval" />
+        </small>
+      )}
+      {isCurrent && source && <small>{source}</small>}
+      {change !== null && <small>{against(change, bestTitle)}</small>}
+    </Group>
   );
 }
 

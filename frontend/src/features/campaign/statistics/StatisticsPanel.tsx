@@ -38,13 +38,13 @@ function Results(all: CampaignStatistics) {
   const { comparison, drift, track_record: record, notes, battery_trend: trend } = all;
   const shown = [comparison, drift, record, trend].map((one) => one?.sentence ?? "");
   return (
-    <div className={classes["results"]}>
-      <SimpleGrid minColWidth="min(250px, 100%)" autoFlow="auto-fit" spacing={12}>
+    <Group align="start" gap="14px 20px">
+      <SimpleGrid flex="1 1 460px" minColWidth="min(250px, 100%)" autoFlow="auto-fit" spacing={12}>
         <Verdict comparison={comparison} unit={all.error_unit} />
         <Scatter {...all} />
         <Predictions record={record} />
       </SimpleGrid>
-      <Stack gap={14}>
+      <Stack gap={14} flex="999 1 680px">
         <Groups {...all} />
         <Stack component="ul" gap={4} pl={20} c="dimmed" fz="small" lh={1.45}>
           {drift && (
@@ -60,7 +60,7 @@ function Results(all: CampaignStatistics) {
             ))}
         </Stack>
       </Stack>
-    </div>
+    </Group>
   );
 }
 
