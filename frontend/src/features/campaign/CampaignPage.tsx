@@ -67,7 +67,17 @@ const TABS = ["trends", "flights", "statistics"] as const;
 function useTab(): [string, (tab: string | null) => void] {
   const [params, setParams] = useSearchParams();
   const tab = TABS.find((one) => one === params.get("tab")) ?? TABS[0];
-  return [tab, (value) => setParams(!value || value === TABS[0] ? {} : { tab: value }, { replace: true })];
+  const open = (value: string | null): void =>
+    setParams(
+      (before) => {
+        const after = new URLSearchParams(before);
+        if (value === null || value === TABS[0]) after.delete("tab");
+        else after.set("tab", value);
+        return after;
+      },
+      { replace: true },
+    );
+  return [tab, open];
 }
 
 const NONE: readonly Trial[] = [];
