@@ -93,7 +93,14 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         </Stack>
         <ErrorNotice error={formProblem(chosen.error, labels)} shown={Object.keys(labels)} />
         {refusal && <GateRefusal gate={refusal} onUse={chosen.entry && chosen.use} />}
-        <FlightButtons {...{ campaign, proposal, chosen, number, upload, isSecondary }} />
+        <FlightButtons
+          campaign={campaign}
+          proposal={proposal}
+          chosen={chosen}
+          number={number}
+          upload={upload}
+          isSecondary={isSecondary}
+        />
       </Stack>
       <Stack gap={10} mt={10}>
         <div>
