@@ -19,7 +19,7 @@ from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_analyses import manoeuvres, replicas, takeoffs
 from app.log_analyses.schemas import LogAnswer, Part, Refusal, ReplicaAnswer, TuningAnswer
-from app.logs.formats import HEAD_BYTES, Format, recognise
+from app.logs.formats import HEAD_BYTES, NEVER_WRITTEN, Format, recognise
 
 ANALYSED: Final = (
     "ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or .tlog log "
@@ -30,31 +30,29 @@ _OTHER_FILES: Final[Mapping[Format | None, str]] = {
     Format.GZIP: "is compressed (gzip): unpack it first",
     Format.ZIP: "is an archive (zip): unpack it first",
     Format.DATAFLASH_TEXT: "is a .bin log converted to text: use the .bin itself",
+    Format.ZEROS: NEVER_WRITTEN,
 }
 
 Answer = TypeVar("Answer", TuningAnswer, ReplicaAnswer)
 
 
 def _decoded(content: bytes, companion: bytes | None, name: str) -> tuple[Reader, Recording]:
+    """The reader of a log, and the recording of the vehicle with the most to learn."""
     head = content[:HEAD_BYTES]
     reader = reader_of(head)
     if reader is None:
         what = _OTHER_FILES.get(recognise(head), "is not a log") if head else "is empty"
         hint = f"Use {ANALYSED}, {_TRACES}."
         raise TrajectoryError(f"{name} cannot be used.", hint=hint, problems=(Problem("file", what),))
-    return reader, reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
-
-
-def _flown(reader: Reader, recording: Recording, name: str) -> LoggedFlight | Sequence[Takeoff]:
-    """The flight of a copter's log, or every takeoff of a Paparazzi log."""
-    flight = reader.flight(recording, name)
-    return reader.takeoffs(recording) if flight is None else flight
+    recording = reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
+    return reader, reader.vehicle(recording, name)
 
 
 def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[Takeoff] | Definition:
     """Read what a campaign starts with: the takeoffs of a Paparazzi log, or its definition with the gains proposed from
     a copter's, which takes some seconds. Raises InputError that names what is missing or wrong."""
-    flown = _flown(*_decoded(content, companion, name), name)
+    reader, recording = _decoded(content, companion, name)
+    flown = reader.flown(recording, name)
     return manoeuvres.start_of(analyze(flown), name) if isinstance(flown, LoggedFlight) else flown
 
 
@@ -70,7 +68,7 @@ def analyze_content(
     if autopilot is None:
         reader, recording = _decoded(content, companion, name)
         autopilot = recording.autopilot
-        tuning, plots = _answered(lambda: _tuning(_flown(reader, recording, name), name))
+        tuning, plots = _answered(lambda: _tuning(reader.flown(recording, name), name))
         checked = _answered(lambda: _checked(autopilot, lambda loop: loop.check_log(recording, name, gains)))
     else:
         hint = f"For better gains use {ANALYSED}."
