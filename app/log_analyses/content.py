@@ -15,6 +15,7 @@ from app.common.schemas import ProblemField
 from app.core.analysis.analysis import analyze
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, Problem, TrajectoryError
+from app.core.formatting import capitalised
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_analyses import manoeuvres, replicas, takeoffs
@@ -36,8 +37,10 @@ _OTHER_FILES: Final[Mapping[Format | None, str]] = {
 Answer = TypeVar("Answer", TuningAnswer, ReplicaAnswer)
 
 
-def _decoded(content: bytes, companion: bytes | None, name: str) -> tuple[Reader, Recording]:
-    """The reader of a log, and the recording of the vehicle with the most to learn."""
+def _decoded(
+    content: bytes, companion: bytes | None, name: str, vehicle: int | None = None
+) -> tuple[Reader, Recording]:
+    """The reader of a log, and the recording of the vehicle with this system id, or the one with the most to learn."""
     head = content[:HEAD_BYTES]
     reader = reader_of(head)
     if reader is None:
@@ -45,7 +48,7 @@ def _decoded(content: bytes, companion: bytes | None, name: str) -> tuple[Reader
         hint = f"Use {ANALYSED}, {_TRACES}."
         raise TrajectoryError(f"{name} cannot be used.", hint=hint, problems=(Problem("file", what),))
     recording = reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
-    return reader, reader.vehicle(recording, name)
+    return reader, reader.vehicle(recording, name, vehicle)
 
 
 def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[Takeoff] | Definition:
@@ -57,18 +60,22 @@ def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[T
 
 
 def analyze_content(
-    content: bytes, companion: bytes | None, name: str, gains: str = ""
+    content: bytes, companion: bytes | None, name: str, gains: str = "", vehicle: int | None = None
 ) -> tuple[LogAnswer, dict[Part, list[Plot]]]:
     """The answer of a log or trace in memory, and the figures of its parts; takes some seconds.
 
-    `gains` are `KP,KI,KD` as flown, if the log does not contain them. Raises InputError that names what is missing or
-    wrong where neither part has an answer.
+    `gains` are `KP,KI,KD` as flown, if the log does not contain them; `vehicle` is the system id of the one to analyse,
+    by default that with the most to learn. Raises InputError that names what is missing or wrong where neither part has
+    an answer.
     """
     autopilot = traced(content[:HEAD_BYTES])
     if autopilot is None:
-        reader, recording = _decoded(content, companion, name)
+        reader, recording = _decoded(content, companion, name, vehicle)
         autopilot = recording.autopilot
         tuning, plots = _answered(lambda: _tuning(reader.flown(recording, name), name))
+        if isinstance(tuning, TuningAnswer):
+            notes = [*tuning.notes, *(f"{capitalised(note)}." for note in recording.notes)]
+            tuning = tuning.model_copy(update={"notes": notes})
         checked = _answered(lambda: _checked(autopilot, lambda loop: loop.check_log(recording, name, gains)))
     else:
         hint = f"For better gains use {ANALYSED}."

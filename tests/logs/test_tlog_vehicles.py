@@ -208,6 +208,14 @@ def test_the_vehicle_with_the_most_to_learn_is_analysed_whichever_reports_most(f
         reader.vehicle(recording, "flight.tlog", 3)
 
 
+@pytest.mark.complete
+def test_the_analysis_says_that_there_was_another_and_takes_it_on_request(fleet: bytes) -> None:
+    answer, _ = analyze_content(fleet, None, "flight.tlog")
+    assert "Another vehicle in the log, system 9 under ArduPilot." in getattr(answer.tuning, "notes", ())
+    with pytest.raises(TrajectoryError, match=r"only in LOITER.*another vehicle in the log, system 1 under ArduPilot"):
+        analyze_content(fleet, None, "flight.tlog", vehicle=9)
+
+
 def recording_of(content: bytes) -> Recording:
     return read_tlog(io.BytesIO(content))
 
