@@ -91,8 +91,9 @@ def read_tlog(stream: BinaryIO) -> Recording:
                 for each in using.values():
                     if each.vehicle.is_asked(message):
                         _REQUESTS[message.name](each, message)
-    first, *others = (each.recording([*decoders.values()]) for each in decoders.values())
-    return replace(first, others=others)
+    recordings = [each.recording([*decoders.values()]) for each in decoders.values()]
+    first, *others = sorted(recordings, key=lambda each: "altitude_m" not in each.columns)
+    return replace(first, others=[each for each in others if "altitude_m" in each.columns])
 
 
 @dataclass(slots=True)

@@ -25,16 +25,9 @@ _POSITIONS: Final = (32, 33, 30)
 """LOCAL_POSITION_NED, GLOBAL_POSITION_INT, ATTITUDE."""
 _USUAL_COMPONENT: Final = 1
 _FRAMES: Final[Mapping[int, str]] = MappingProxyType(
-    {
-        **dict.fromkeys((2, 3, 13, 14, 15, 29, 35, 43), ""),
-        1: "a fixed-wing aircraft",
-        4: "a helicopter",
-        5: "an antenna tracker",
-        10: "a rover",
-        11: "a boat",
-        12: "a submarine",
-        **dict.fromkeys((*range(19, 26), 47), "an aircraft that takes off vertically (VTOL)"),
-    }
+    dict.fromkeys((2, 3, 13, 14, 15, 29, 35, 43), "")
+    | {1: "a fixed-wing aircraft", 4: "a helicopter", 5: "an antenna tracker", 10: "a rover", 11: "a boat"}
+    | {12: "a submarine", **dict.fromkeys((*range(19, 26), 47), "an aircraft that takes off vertically (VTOL)")}
 )
 """By the kind of vehicle in the heartbeat; empty for a copter with several rotors."""
 _NO_VEHICLES: Final = frozenset({6, 18, 26, 27, *range(30, 35), *range(36, 43), 44, 48, 49})

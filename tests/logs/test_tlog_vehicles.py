@@ -169,6 +169,16 @@ def test_a_vehicle_that_stands_by_is_no_reason_to_refuse_the_one_that_flies() ->
         takeoffs(idle.content + flight(system=3, lasts_s=0).content)
 
 
+def test_a_vehicle_of_which_no_position_is_whole_is_no_reason_either() -> None:
+    """Its positions are more, but damaged."""
+    damaged = b"".join(
+        record[:20] + bytes([record[20] ^ 1]) + record[21:] if record[15] == 32 else record
+        for record in frames_of(flight(system=2, lasts_s=20).content)
+    )
+    (found,) = takeoffs(together(damaged, flight(system=1).content))
+    assert same(found, takeoffs(flight(system=1))[0])
+
+
 def test_vehicles_under_different_autopilots_are_read_as_their_own() -> None:
     found = takeoffs(together(recorded("paparazzi_283_13_82.tlog"), flight(system=1).content))
     assert {each.system: each.gain_names[0] for each in found} == {1: "PSC_POSZ_P", 31: "kp"}
