@@ -147,7 +147,8 @@ class _Reader:
         if frame := self.recording.frame:
             raise self._refused("file", f"is the log of {frame}, not of a copter with several rotors")
         if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
-            raise TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
+            noted = (*problems, *(Problem("file", note) for note in self.recording.notes))
+            raise TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=noted)
         rows = self._rows()
         time_s, target_m = rows.time_s, rows["set_point_m"]
         none_found = (
@@ -305,7 +306,7 @@ class _Reader:
 
     @property
     def _refused(self) -> Refused:
-        return refusal(f"{self.name} cannot be analysed.", self.autopilot.hint)
+        return refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, self.recording.notes)
 
 
 def _follows(recording: Recording, autopilot: _Autopilot, time_s: Samples) -> Rows:

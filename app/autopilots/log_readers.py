@@ -1,10 +1,12 @@
 """All supported kinds of logs; a new one takes one line in `READERS`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import PurePath
 from typing import BinaryIO, Final
+
+import numpy as np
 
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.logged_flight import ardupilot_flight
@@ -15,12 +17,12 @@ from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.logged_flight import px4_flight
 from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
-from app.autopilots.tlog import HINT as TLOG_HINT
 from app.autopilots.tlog import read_tlog
+from app.autopilots.tlog_vehicles import HINT as TLOG_HINT
 from app.core.analysis.loop import LoggedFlight
-from app.core.errors import Problem, TrajectoryError
+from app.core.errors import InputError, Problem, TrajectoryError
 from app.logs.base import refused
-from app.logs.formats import Format, head_of, recognise
+from app.logs.formats import NEVER_WRITTEN, Format, head_of, recognise
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.logs.ulog import HINT as ULOG_HINT
 
@@ -38,10 +40,38 @@ class Reader:
     hint: str
 
     def takeoffs(self, recording: Recording) -> Sequence[Takeoff]:
-        """Every takeoff. Raises TrajectoryError if there is none, or no altitude."""
+        """Every takeoff, of all vehicles. Raises TrajectoryError if there is none, or no altitude."""
         if "altitude_m" not in recording.columns:
             raise refused(f"contains {self.altitude}", self.hint)
         return find_takeoffs(recording)
+
+    def flown(self, recording: Recording, name: str) -> LoggedFlight | Sequence[Takeoff]:
+        """The flight of a copter's log, or every takeoff of a Paparazzi log, to be analysed. Raises InputError that
+        names what is missing or wrong."""
+        flight = self.flight(recording, name)
+        return self.takeoffs(recording) if flight is None else flight
+
+    def vehicle(self, recording: Recording, name: str, system: int | None = None) -> Recording:
+        """The recording of one vehicle in a log: with this system id, or the one with the most to learn. Raises
+        TrajectoryError if none has the id."""
+        vehicles = [replace(each, others=()) for each in (recording, *recording.others)]
+        chosen = [each for each in vehicles if system in (None, each.system)]
+        if not chosen:
+            there = ", ".join(str(each.system) for each in vehicles)
+            raise refused(f"has no vehicle {system}, only {there}", "Choose one of these.", field="vehicle")
+        return chosen[0] if len(chosen) == 1 else max(chosen, key=lambda each: self._to_learn(each, name))
+
+    def _to_learn(self, recording: Recording, name: str) -> tuple[bool, float]:
+        """Whether the vehicle's flight can be analysed, and by how much it moves."""
+        altitude = recording.columns.get("altitude_m")
+        moves_m = 0.0 if altitude is None else float(np.ptp(np.nan_to_num(altitude.values)))
+        try:
+            flown = self.flown(recording, name)
+        except InputError:
+            return False, moves_m
+        if isinstance(flown, LoggedFlight):
+            moves_m = float(sum(np.ptp(each.z_d_m) for each in flown.segments))
+        return True, moves_m
 
 
 def _alone(read: Callable[[BinaryIO], Recording]) -> Callable[[BinaryIO, BinaryIO | None], Recording]:
@@ -98,6 +128,8 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     head = head_of(stream)
     if (reader := reader_of(head)) is not None:
         return reader.takeoffs(reader.read(stream, companion))
+    if recognise(head) is Format.ZEROS:
+        raise refused(NEVER_WRITTEN, "Copy the file again, or use another log of the flight.")
     suffix = PurePath(name).suffix.lower()
     if suffix == ".log":
         raise TrajectoryError(

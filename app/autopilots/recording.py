@@ -8,6 +8,7 @@ and thrusts are positive up.
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
 from itertools import groupby
 from operator import itemgetter
@@ -183,7 +184,9 @@ class Recording:
     that it has, of which some are columns. `in_air` are the intervals from lift-off to touchdown, `armed`
     those with the motors armed, both as reported by the autopilot and in order; None if it does not report them.
     `blocks` are the intervals in blocks of a flight plan, each from the command that activated it. `notes` say what was
-    lost or damaged, and `remarks` how takeoffs are found for want of a message.
+    lost or damaged, and `remarks` how takeoffs are found for want of a message. `started_at` is the
+    date, UTC, of its 0 s, None if unknown. `others` are those of other vehicles in the same log, and `heard_s` the time
+    of one clock for all, s, at which each is heard first.
     """
 
     title: str
@@ -202,6 +205,9 @@ class Recording:
     blocks: Sequence[Span] = ()
     notes: Sequence[str] = ()
     remarks: Sequence[str] = ()
+    started_at: datetime | None = None
+    others: Sequence["Recording"] = ()
+    heard_s: float = 0.0
 
     def at(self, name: str, time_s: Samples) -> Samples:
         """A column at these times, shape (n,); NaN if there is none."""

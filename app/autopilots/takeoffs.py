@@ -8,14 +8,15 @@ the log contains one, else at lift-off; it ends with the landing command, a chan
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from typing import Final
 
 import numpy as np
 
 from app.autopilots.recording import Event, EventKind, Recording, Span
 from app.core.errors import Problem, TrajectoryError
-from app.core.formatting import format_gains, times
+from app.core.formatting import count, format_gains, times
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS, Samples, Trajectory
 
@@ -27,6 +28,8 @@ MAX_SAMPLES: Final = 200_000
 MAX_TAKEOFFS: Final = 200
 NOT_COMMANDED: Final = "not comparable: it begins at lift-off, because the log does not contain the takeoff command"
 
+_WHOLE_FLIGHT: Final = "Choose the log of the flight itself, recorded from before the takeoff."
+_OFTEN: Final = "Record the vehicle's local position at 20 Hz or more during the whole flight."
 _RISE_S: Final = (0.5, 1.0, 2.0, 3.0)
 _STOOD_M: Final = 0.05
 _LANDED_S: Final = 2.0
@@ -45,8 +48,9 @@ class Takeoff:
 
     `trajectory` is its record, with time counted from its beginning; `gains` are those used then, empty if not in the
     log; `gain_names` are those of its autopilot, empty if the format has none; `notes` explain how both were read.
-    `start_s` is in seconds since the log's first sample. A takeoff that is not `is_commanded` begins at lift-off: its
-    error is over another window than that of a commanded one, and not comparable with it.
+    `start_s` is in seconds since the log's first sample, `began_at` the date, UTC, if it is known; `system` is that of
+    the vehicle if the log has several. A takeoff that is not `is_commanded` begins at lift-off: its error is over
+    another window than that of a commanded one, and not comparable with it.
     """
 
     number: int
@@ -57,23 +61,50 @@ class Takeoff:
     gain_names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     is_commanded: bool = True
+    system: int | None = None
+    began_at: datetime | None = None
 
     @property
     def summary(self) -> str:
         """Description for a list to choose from."""
         held = format_gains(self.gains) or "gains not in the log"
         highest = f"{self.trajectory['altitude_m'].max():.2f}".replace("-", "−")
+        vehicle = "" if self.system is None else f"system {self.system}, "
+        date = f", {self.began_at:%Y-%m-%d %H:%M} UTC" if self.began_at else ""
         return (
-            f"{self.start_s:.1f} s into the log, at {self.begins_with}: {self.trajectory.time_s[-1]:.1f} s recorded, "
-            f"highest {highest} m, {held}"
+            f"{vehicle}{self.start_s:.1f} s into the log, at {self.begins_with}: {self.trajectory.time_s[-1]:.1f} s "
+            f"recorded, highest {highest} m, {held}{date}"
         )
 
 
 def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
-    """Find the takeoffs, ordered by time. Raises TrajectoryError if there is none."""
+    """Find the takeoffs of all vehicles, ordered by time. Raises TrajectoryError if there is none."""
+    if not log.others:
+        return tuple(_takeoffs_of(log))
+    vehicles = (log, *log.others)
+    began_s = min(each.heard_s for each in vehicles)
+    found: list[Takeoff] = []
+    problems: list[Problem] = []
+    for each in vehicles:
+        try:
+            takeoffs = _takeoffs_of(each)
+        except TrajectoryError as refusal:
+            problems += (replace(why, reason=f"system {each.system}: {why.reason}") for why in refusal.problems)
+        else:
+            after_s = each.heard_s - began_s
+            found += (replace(one, system=each.system, start_s=one.start_s + after_s) for one in takeoffs)
+    if not found:
+        raise TrajectoryError("No vehicle in the log takes off.", hint=_WHOLE_FLIGHT, problems=tuple(problems))
+    found.sort(key=lambda takeoff: takeoff.start_s)
+    return tuple(replace(takeoff, number=number) for number, takeoff in enumerate(found, 1))
+
+
+def _takeoffs_of(log: Recording) -> list[Takeoff]:
+    """The takeoffs of one vehicle."""
     time_s, channels = _usable(log)
     altitude_m = channels["altitude_m"]
     found: list[Takeoff] = []
+    sparse: list[str] = []
     free_from_s = -np.inf
     for stood, down in _flights(log, time_s, altitude_m):
         begin = _beginning(log, float(time_s[stood]), free_from_s)
@@ -84,6 +115,9 @@ def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
             ground_m = float(altitude_m[first:past].mean() if past > first else altitude_m[stood])
             record = _Record(log, begin, end, ground_m, held)
             found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
+        else:
+            at_s = begin.time_s - time_s[0]
+            sparse.append(f"has {count(kept.stop - kept.start, 'sample')} of the takeoff {at_s:.1f} s into the log")
         free_from_s = float(time_s[down])
         if len(found) > MAX_TAKEOFFS:
             raise TrajectoryError(
@@ -92,18 +126,14 @@ def find_takeoffs(log: Recording) -> tuple[Takeoff, ...]:
                 problems=(Problem("file", "contains too many flights"),),
             )
     if not found:
+        varies = f"varies by {np.ptp(altitude_m):.2f} m within {time_s[-1] - time_s[0]:.1f} s"
+        none = f"{varies}, without a rise by {HIGHEST_HOP_M:g} m {_where_looked(log)}"
         raise TrajectoryError(
-            "The log contains no takeoff.",
-            hint="Choose the log of the flight itself, recorded from before the takeoff.",
-            problems=(
-                Problem(
-                    "altitude_m",
-                    f"varies by {np.ptp(altitude_m):.2f} m within {time_s[-1] - time_s[0]:.1f} s, without a rise by "
-                    f"{HIGHEST_HOP_M:g} m {_where_looked(log)} in at least {MIN_SAMPLES} samples",
-                ),
-            ),
+            f"The log contains no takeoff{f' with at least {MIN_SAMPLES} samples' if sparse else ''}.",
+            hint=_OFTEN if sparse else _WHOLE_FLIGHT,
+            problems=tuple(Problem("altitude_m", each) for each in sparse[:_LISTED] or [none]),
         )
-    return tuple(found)
+    return found
 
 
 def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
@@ -130,7 +160,7 @@ def _usable(log: Recording) -> tuple[Samples, Mapping[str, Samples]]:
     if len(time_s) < MIN_SAMPLES:
         raise TrajectoryError(
             f"The log contains {len(time_s)} usable samples of the altitude; a flight needs at least {MIN_SAMPLES}.",
-            hint="Record the vehicle's local position at 20 Hz or more during the whole flight.",
+            hint=_OFTEN,
             problems=(Problem("altitude_m", "has too few samples"),),
         )
     channels = (name for name in log.columns if name in CHANNEL_UNITS)
@@ -292,6 +322,7 @@ class _Record:
             gain_names=tuple(gain.gain for gain in self.log.autopilot.gain_sets[0]),
             notes=notes,
             is_commanded=self.begin.kind is EventKind.TAKEOFF,
+            began_at=self.log.started_at and self.log.started_at + timedelta(seconds=self.begin.time_s),
         )
 
     def _notes(self, left_out: Sequence[str]) -> Iterator[str]:

@@ -1,22 +1,23 @@
-"""Telemetry logs (.tlog) to a `Recording`: what the vehicle reports, and what ground stations ask of it.
+"""Telemetry logs (.tlog) to a `Recording` of each vehicle: what it reports, and what is asked of it.
 
 Such a log has both directions of a connection, often of several vehicles, components and ground stations; messages may
-be lost, late or repeated, and the vehicle may restart. Time is the vehicle's own clock: messages without one are dated
+be lost, late or repeated, and a vehicle may restart. Time is the vehicle's own clock: messages without one are dated
 by the last message that has one. A takeoff begins with the ground station's command (a block with such a name, or else
 the one in which it lifted off; NAV_TAKEOFF, the takeoff mode); parameters are those that the vehicle replies with.
 """
 
 import struct
 from array import array
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime, timedelta
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.autopilots.autopilot import Autopilot, GainParameter
+from app.autopilots.autopilot import GainParameter
 from app.autopilots.recording import (
     LONGEST_INTERVAL_S,
     Event,
@@ -29,15 +30,11 @@ from app.autopilots.recording import (
     restarts,
     spans_of,
 )
-from app.autopilots.registry import AUTOPILOTS
+from app.autopilots.tlog_vehicles import Vehicle, find_vehicles
 from app.core.records.trajectory import THROTTLE_HOLDS_S
-from app.logs.base import Contents, Table, contents, refused
-from app.logs.tlog import Message, frames, messages
+from app.logs.base import Table, contents
+from app.logs.tlog import Message, messages
 
-HINT: Final = (
-    "Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
-    "contain the ground station's commands."
-)
 SOURCES: Final[Mapping[str, Source]] = {
     "altitude_m": Source("LOCAL_POSITION_NED", "z", -1.0),
     "climb_rate_m_s": Source("LOCAL_POSITION_NED", "vz", -1.0),
@@ -58,11 +55,14 @@ _FIELDS: Final = {
 }
 """Of each message that is reported."""
 _TIME: Final = "time_s"
-_FROM_ANY: Final = frozenset({"PARAM_SET", "SET_POSITION_TARGET_LOCAL_NED"})
-"""Requests that count whoever sends them; others only from another system."""
 _BACK_S: Final = 20.0
 """If the clock goes back by less than this, and not to a time since its last message, the message was late."""
 _SHORTEST_BOOT_S: Final = 1.0
+_LONGEST_OFF_S: Final = 86_400.0
+"""If the ground's time jumps by more than this, its clock was set."""
+_APART_S: Final = 2.0
+_SET_S: Final = datetime(2001, 1, 1, tzinfo=UTC).timestamp()
+"""A ground station whose clock is before this has none."""
 _ARMED: Final = 128
 _ACCEPTED: Final = (0, 5)
 _MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
@@ -74,80 +74,68 @@ _IGNORES_Z: Final = 4
 _IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
 _IGNORES_ATTITUDE: Final = 128
 _INTEGERS: Final = range(1, 9)
-_AUTOPILOTS: Final = {each.autopilot: each for each in AUTOPILOTS.values()}
-"""By the autopilot number in the heartbeat."""
-_LOCAL_POSITION_NED: Final = 32
-_COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
-"""Kinds of vehicles with several rotors, in a heartbeat."""
-_OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
-    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
-)
 
 
 def read_tlog(stream: BinaryIO) -> Recording:
-    """Decode the messages of the vehicle that reports its position most often. Raises TrajectoryError if there is no
-    heartbeat of a known autopilot."""
+    """Decode the messages of the vehicle that reports its position most often, and of the `others`. Raises
+    TrajectoryError if there is no heartbeat of a known autopilot."""
     data = contents(stream)
-    decoder = _Decoder(_find_vehicle(data))
-    for message in messages(data, decoder.vehicle.autopilot.dialect.library, {*_REPORTS, *_REQUESTS}):
-        decoder.take(message)
-    return decoder.recording()
-
-
-@dataclass(frozen=True, slots=True)
-class _Vehicle:
-    """A vehicle in a log: its system and component, its autopilot, and the number of its kind."""
-
-    system: int
-    component: int
-    autopilot: Autopilot
-    kind: int
-
-
-def _find_vehicle(data: Contents) -> _Vehicle:
-    """The vehicle that reports its position most often. Raises TrajectoryError if there is no heartbeat of a known
-    autopilot."""
-    from pymavlink.dialects.v20 import minimal
-
-    found: dict[tuple[int, int], _Vehicle] = {}
-    for message in messages(data, minimal, {"HEARTBEAT"}):
-        place, autopilot = (message.system, message.component), _AUTOPILOTS.get(int(message["autopilot"]))
-        if autopilot is not None and place not in found:
-            found[place] = _Vehicle(*place, autopilot, int(message["type"]))
-    if not found:
-        known = ", ".join(autopilot.project or autopilot.title for autopilot in _AUTOPILOTS.values())
-        raise refused(f"contains no MAVLink heartbeat of {known}", HINT)
-    positions = Counter(
-        (frame.system, frame.component) for frame in frames(data) if frame.message == _LOCAL_POSITION_NED
-    )
-    return max(found.values(), key=lambda each: positions[each.system, each.component])
+    decoders = {(each.system, each.component): _Decoder(each) for each in find_vehicles(data)}
+    for library in {each.vehicle.autopilot.dialect.library for each in decoders.values()}:
+        using = {place: each for place, each in decoders.items() if each.vehicle.autopilot.dialect.library is library}
+        for message in messages(data, library, {*_REPORTS, *_REQUESTS}):
+            sender = using.get((message.system, message.component))
+            if sender is not None and message.name in _REPORTS:
+                _REPORTS[message.name](sender, message)
+            elif message.name in _REQUESTS:
+                for each in using.values():
+                    if each.vehicle.is_asked(message):
+                        _REQUESTS[message.name](each, message)
+    recordings = [each.recording([*decoders.values()]) for each in decoders.values()]
+    first, *others = sorted(recordings, key=lambda each: "altitude_m" not in each.columns)
+    return replace(first, others=[each for each in others if "altitude_m" in each.columns])
 
 
 @dataclass(slots=True)
 class _Clock:
-    """Seconds since the vehicle's first boot in the log; a restart goes on in the ground's time."""
+    """Seconds since the vehicle's first boot in the log; a restart goes on in the ground's time.
+
+    `first_heard_s` and `last_heard_s` are in the ground's time too.
+    """
 
     now_s: float = -np.inf
     restarts: list[Event] = field(default_factory=list)
+    first_heard_s: float = np.inf
+    last_heard_s: float = 0.0
     _ahead_s: float = 0.0
-    _stamp_s: float = 0.0
+    _zero_s: float = np.inf
+    """The ground's time at 0 s, once its clock is set."""
 
     def at(self, boot_ms: float, stamp_s: float) -> float:
-        time_s, elapsed_s = boot_ms / 1000 + self._ahead_s, stamp_s - self._stamp_s
+        time_s, elapsed_s = boot_ms / 1000 + self._ahead_s, stamp_s - self.last_heard_s
         has_just_booted = boot_ms / 1000 <= elapsed_s + _SHORTEST_BOOT_S
         if time_s < self.now_s - (_SHORTEST_BOOT_S if has_just_booted else _BACK_S):
-            self._ahead_s += self.now_s + max(elapsed_s, _SHORTEST_BOOT_S) - time_s
+            self._ahead_s += self.now_s + min(max(elapsed_s, _SHORTEST_BOOT_S), _LONGEST_OFF_S) - time_s
             time_s = boot_ms / 1000 + self._ahead_s
             self.restarts.append(Event(EventKind.BOOT, time_s, "the vehicle restarting"))
-        self.now_s, self._stamp_s = max(self.now_s, time_s), stamp_s
+        self.now_s, self.last_heard_s = max(self.now_s, time_s), stamp_s
+        self.first_heard_s = min(self.first_heard_s, stamp_s)
+        if stamp_s >= _SET_S and self._zero_s > stamp_s:
+            self._zero_s = stamp_s - time_s
         return time_s
+
+    @property
+    def started_at(self) -> datetime | None:
+        """The date of 0 s; None if the ground station's clock was not set, or is ahead."""
+        is_past = self._zero_s <= (datetime.now(UTC) + timedelta(days=1)).timestamp()
+        return datetime.fromtimestamp(self._zero_s, UTC) if is_past else None
 
 
 @dataclass(slots=True)
 class _Decoder:
     """Messages of ground stations and the vehicle, in order of receipt."""
 
-    vehicle: _Vehicle
+    vehicle: Vehicle
     _gains: Mapping[str, GainParameter] = field(init=False)
     _clock: _Clock = field(default_factory=_Clock)
     _reports: "defaultdict[str, array[float]]" = field(default_factory=lambda: defaultdict(lambda: array("d")))
@@ -170,18 +158,9 @@ class _Decoder:
     def __post_init__(self) -> None:
         self._gains = {gain.parameter: gain for gains in self.vehicle.autopilot.gain_sets for gain in gains}
 
-    def take(self, message: Message) -> None:
-        handlers: _Handlers = {}
-        if (message.system, message.component) == (self.vehicle.system, self.vehicle.component):
-            handlers = _REPORTS
-        elif message.system != self.vehicle.system or message.name in _FROM_ANY:
-            handlers = _REQUESTS
-        if message.name in handlers:
-            handlers[message.name](self, message)
-
-    def recording(self) -> Recording:
-        """What was read so far."""
-        autopilot, kind = self.vehicle.autopilot, self.vehicle.kind
+    def recording(self, decoders: Sequence["_Decoder"]) -> Recording:
+        """What was read so far; `decoders` are those of all vehicles in the log."""
+        autopilot = self.vehicle.autopilot
         self._events.extend(self._sent.values())  # a command without an answer counts as accepted
         for time_s, number in self._activated:
             name = self._blocks.get(number, "")
@@ -193,7 +172,9 @@ class _Decoder:
             title=f"MAVLink log of {autopilot.project or autopilot.title}",
             autopilot=autopilot,
             system=self.vehicle.system,
-            frame="" if kind in _COPTERS else _OTHER_KINDS.get(kind, f"a vehicle of MAVLink's type {kind}"),
+            frame=self.vehicle.frame,
+            started_at=self._clock.started_at,
+            heard_s=self._clock.first_heard_s,
             columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
             sources=list(tables),
             settings=self._settings,
@@ -202,6 +183,7 @@ class _Decoder:
             armed=spans_of(self._arming) or None,
             blocks=list(self._commanded_blocks()),
             notes=[
+                *(self._beside(each) for each in decoders if each is not self),
                 *restarts(len(self._clock.restarts)),
                 *(
                     f"{name} was set to {value:g}, but the vehicle never confirmed it"
@@ -210,6 +192,18 @@ class _Decoder:
             ],
         )
 
+    def _beside(self, other: "_Decoder") -> str:
+        """The note on another vehicle in the log."""
+        project = other.vehicle.autopilot.project or other.vehicle.autopilot.title
+        clocks = self._clock, other._clock
+        gone_s, came_s = min(each.last_heard_s for each in clocks), max(each.first_heard_s for each in clocks)
+        same = (
+            "; never heard together with this one: the same if its system id was changed"
+            if gone_s <= came_s + _APART_S
+            else ""
+        )
+        return f"another vehicle in the log, system {other.vehicle.system} under {project}{same}"
+
     def _report(self, message: Message, *values: float) -> None:
         """Take a report, dated by its own time, or else by the last one."""
         has_time = "time_boot_ms" in message.fields
@@ -217,6 +211,8 @@ class _Decoder:
         self._reports[message.name].extend((time_s, *values))
 
     def _heartbeat(self, message: Message) -> None:
+        if not self.vehicle.sends(message):
+            return
         is_armed, mode, now_s = bool(int(message["base_mode"]) & _ARMED), int(message["custom_mode"]), self._clock.now_s
         was_armed = bool(self._arming) and self._arming[-1][1]
         if was_armed and not is_armed:

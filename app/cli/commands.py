@@ -264,6 +264,7 @@ def analyze(
     gains: Annotated[
         str, typer.Option(metavar="KP,KI,KD", help="Gains flown, for the replica, if no log contains them.")
     ] = "",
+    vehicle: Annotated[int | None, typer.Option(metavar="ID", help="System id, if a log has several vehicles.")] = None,
     params: Annotated[
         Path | None,
         typer.Option(
@@ -279,7 +280,7 @@ def analyze(
     replica of the autopilot's vertical loop explains it."""
     from app.cli.files import analyze_log
 
-    analyze_log(log, gains=gains, json_out=json_out, params_out=params)
+    analyze_log(log, gains=gains, vehicle=vehicle, json_out=json_out, params_out=params)
 
 
 @app.command()

@@ -114,7 +114,7 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
             accepted |= {problem.field for problem in needed.problems}
 
 
-def analyze_log(file: Path, *, gains: str, json_out: Path | None, params_out: Path | None) -> None:
+def analyze_log(file: Path, *, gains: str, vehicle: int | None, json_out: Path | None, params_out: Path | None) -> None:
     """Print the analysis of a log, and write it and the proposed parameters where asked for.
 
     Raises InputError for a log that cannot be analysed, and for a parameter file where nothing is proposed.
@@ -124,7 +124,7 @@ def analyze_log(file: Path, *, gains: str, json_out: Path | None, params_out: Pa
     with reading(file, ANALYSED):
         beside = companion_of(file)
         content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
-    answer, _ = analyze_content(content, companion, file.name, gains)
+    answer, _ = analyze_content(content, companion, file.name, gains, vehicle)
     out = console(json_out)
     out.print(f"[bold]{escape(answer.file_name)}[/]")
     tuning, replica = answer.tuning, answer.replica

@@ -15,11 +15,12 @@ from app.common.schemas import ProblemField
 from app.core.analysis.analysis import analyze
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, Problem, TrajectoryError
+from app.core.formatting import capitalised
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_analyses import manoeuvres, replicas, takeoffs
 from app.log_analyses.schemas import LogAnswer, Part, Refusal, ReplicaAnswer, TuningAnswer
-from app.logs.formats import HEAD_BYTES, Format, recognise
+from app.logs.formats import HEAD_BYTES, NEVER_WRITTEN, Format, recognise
 
 ANALYSED: Final = (
     "ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or .tlog log "
@@ -29,47 +30,51 @@ _OTHER_FILES: Final[Mapping[Format | None, str]] = {
     Format.GZIP: "is compressed (gzip): unpack it first",
     Format.ZIP: "is an archive (zip): unpack it first",
     Format.DATAFLASH_TEXT: "is a .bin log converted to text: use the .bin itself",
+    Format.ZEROS: NEVER_WRITTEN,
 }
 
 Answer = TypeVar("Answer", TuningAnswer, ReplicaAnswer)
 
 
-def _decoded(content: bytes, companion: bytes | None, name: str) -> tuple[Reader, Recording]:
+def _decoded(
+    content: bytes, companion: bytes | None, name: str, vehicle: int | None = None
+) -> tuple[Reader, Recording]:
+    """The reader of a log, and the recording of the vehicle with this system id, or the one with the most to learn."""
     head = content[:HEAD_BYTES]
     reader = reader_of(head)
     if reader is None:
         what = _OTHER_FILES.get(recognise(head), "is not a log") if head else "is empty"
         hint = f"Use {ANALYSED}, or a trace of the vertical loop with one row per step, .csv or .csv.gz."
         raise TrajectoryError(f"{name} cannot be used.", hint=hint, problems=(Problem("file", what),))
-    return reader, reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
-
-
-def _flown(reader: Reader, recording: Recording, name: str) -> LoggedFlight | Sequence[Takeoff]:
-    """The flight of a copter's log, or every takeoff of a Paparazzi log."""
-    flight = reader.flight(recording, name)
-    return reader.takeoffs(recording) if flight is None else flight
+    recording = reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
+    return reader, reader.vehicle(recording, name, vehicle)
 
 
 def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[Takeoff] | Definition:
     """Read what a campaign starts with: the takeoffs of a Paparazzi log, or its definition with the gains proposed from
     a copter's, which takes some seconds. Raises InputError that names what is missing or wrong."""
-    flown = _flown(*_decoded(content, companion, name), name)
+    reader, recording = _decoded(content, companion, name)
+    flown = reader.flown(recording, name)
     return manoeuvres.start_of(analyze(flown), name) if isinstance(flown, LoggedFlight) else flown
 
 
 def analyze_content(
-    content: bytes, companion: bytes | None, name: str, gains: str = ""
+    content: bytes, companion: bytes | None, name: str, gains: str = "", vehicle: int | None = None
 ) -> tuple[LogAnswer, dict[Part, list[Plot]]]:
     """The answer of a log or trace in memory, and the figures of its parts; takes some seconds.
 
-    `gains` are `KP,KI,KD` as flown, if the log does not contain them. Raises InputError that names what is missing or
-    wrong where neither part has an answer.
+    `gains` are `KP,KI,KD` as flown, if the log does not contain them; `vehicle` is the system id of the one to analyse,
+    by default that with the most to learn. Raises InputError that names what is missing or wrong where neither part has
+    an answer.
     """
     autopilot = traced(content[:HEAD_BYTES])
     if autopilot is None:
-        reader, recording = _decoded(content, companion, name)
+        reader, recording = _decoded(content, companion, name, vehicle)
         autopilot = recording.autopilot
-        tuning, plots = _answered(lambda: _tuning(_flown(reader, recording, name), name))
+        tuning, plots = _answered(lambda: _tuning(reader.flown(recording, name), name))
+        if isinstance(tuning, TuningAnswer):
+            notes = [*tuning.notes, *(f"{capitalised(note)}." for note in recording.notes)]
+            tuning = tuning.model_copy(update={"notes": notes})
         checked = _answered(lambda: _checked(autopilot, lambda loop: loop.check_log(recording, name, gains)))
     else:
         hint = f"For better gains use {ANALYSED}."

@@ -11,11 +11,12 @@ from app.logs.tlog import is_tlog
 from app.logs.ulog import is_ulog
 
 HEAD_BYTES: Final = 4096
+NEVER_WRITTEN: Final = "has nothing but zeros where a log begins: it was never written, or not copied"
 _GROUND_LOG_LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
 
 
 class Format(StrEnum):
-    """A kind of log by its usual file suffix, or of a file that contains one."""
+    """A kind of log by its usual file suffix, or of a file that contains one; or of one that was never written."""
 
     TLOG = ".tlog"
     DATAFLASH = ".bin"
@@ -24,6 +25,7 @@ class Format(StrEnum):
     GZIP = ".gz"
     ZIP = ".zip"
     DATAFLASH_TEXT = ".log"
+    ZEROS = "zeros"
 
 
 def head_of(stream: BinaryIO) -> bytes:
@@ -40,13 +42,14 @@ def is_ground_log(head: bytes) -> bool:
 
 
 _KINDS: Final[tuple[tuple[Format, Callable[[bytes], bool]], ...]] = (
-    (Format.TLOG, is_tlog),
     (Format.DATAFLASH, is_dataflash),
     (Format.ULOG, is_ulog),
     (Format.GROUND_LOG, is_ground_log),
     (Format.GZIP, methodcaller("startswith", b"\x1f\x8b")),
     (Format.ZIP, methodcaller("startswith", b"PK\x03\x04")),
     (Format.DATAFLASH_TEXT, methodcaller("startswith", b"FMT, ")),
+    (Format.ZEROS, lambda head: bool(head) and not any(head)),
+    (Format.TLOG, is_tlog),
 )
 
 

@@ -1,6 +1,7 @@
 """Frames of telemetry logs (.tlog): both directions of a MAVLink connection, each preceded by its time in µs."""
 
 import re
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -17,11 +18,14 @@ _MAGIC: Final = re.compile(rb"[\xfe\xfd]")
 _SIGNED: Final = 0x01
 _FIRST_US, _LAST_US = 631_152_000_000_000, 4_102_444_800_000_000
 """Time stamps of the years 1990 … 2100."""
+_NUMBERS: Final = 256
+_REMEMBERED: Final = 1024
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Location of a frame: its first byte and the one past its last; its message number, sender and payload."""
+    """Location of a frame: its first byte and the one past its last; its message number, sender and payload, and its
+    number among its sender's frames, which returns after 256."""
 
     start: int
     end: int
@@ -29,6 +33,7 @@ class Frame:
     system: int
     component: int
     payload: int
+    number: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +58,15 @@ class Message:
 
 
 def is_tlog(head: bytes) -> bool:
-    """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame."""
-    return (
-        len(head) > _STAMP_BYTES
-        and head[_STAMP_BYTES] in _MAGICS
-        and _FIRST_US <= int.from_bytes(head[:_STAMP_BYTES], "big") <= _LAST_US
+    """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame; or
+    three frames in a row, if the clock was not set or the first frame is not whole."""
+    is_begun = len(head) > _STAMP_BYTES and head[_STAMP_BYTES] in _MAGICS
+    if is_begun and _FIRST_US <= int.from_bytes(head[:_STAMP_BYTES], "big") <= _LAST_US:
+        return True
+    found = list(frames(head))
+    return any(
+        third.start - first.end == second.end - second.start + 2 * _STAMP_BYTES
+        for first, second, third in zip(found, found[1:], found[2:], strict=False)
     )
 
 
@@ -75,16 +84,28 @@ def frames(data: Contents) -> Iterator[Frame]:
 
 
 def messages(data: Contents, dialect: ModuleType, names: Collection[str]) -> Iterator[Message]:
-    """Every message with one of these names and a correct checksum, of any sender."""
+    """Every message with one of these names and a correct checksum, of any sender; a frame that came again after later
+    ones is left out."""
     wanted = [number for number, known in dialect.mavlink_map.items() if known.msgname in names]
     fields = {number: _fields(dialect, number) for number in wanted}
+    newest: dict[tuple[int, int], int] = {}
+    recent: deque[bytes] = deque(maxlen=_REMEMBERED)
     for frame in frames(data):
+        sender = frame.system, frame.component
+        is_late = (frame.number - newest.get(sender, frame.number)) % _NUMBERS >= _NUMBERS // 2
+        if not is_late:
+            newest[sender] = frame.number
         if frame.message not in fields:
             continue
         known = dialect.mavlink_map[frame.message]
         past = frame.payload + data[frame.start + 1]
         checksum = int.from_bytes(data[past : past + 2], "little")
         if dialect.x25crc(data[frame.start + 1 : past] + bytes([known.crc_extra])).crc == checksum:
+            content = data[frame.start : past + 2]
+            if is_late and content in recent:
+                continue
+            recent.append(content)
+            newest[sender] = frame.number  # also after a restart
             size = known.unpacker.size  # MAVLink 2 truncates trailing zeros
             payload = data[frame.payload : past][:size].ljust(size, b"\0")
             values = dict(zip(fields[frame.message], known.unpacker.unpack(payload), strict=True))
@@ -103,9 +124,9 @@ def _fields(dialect: ModuleType, number: int) -> list[str]:
 def _frame_at(data: Contents, start: int, size: int) -> Frame | None:
     magic, length = data[start], data[start + 1]
     if magic == 0xFE:
-        end, payload, sender, message = start + 8 + length, start + 6, start + 3, data[start + 5]
+        end, payload, number, message = start + 8 + length, start + 6, start + 2, data[start + 5]
     elif magic == 0xFD:
-        end, payload, sender = start + 12 + length, start + 10, start + 5
+        end, payload, number = start + 12 + length, start + 10, start + 4
         end += 13 if data[start + 2] & _SIGNED else 0
         message = int.from_bytes(data[start + 7 : start + 10], "little")
     else:
@@ -113,4 +134,4 @@ def _frame_at(data: Contents, start: int, size: int) -> Frame | None:
     following = end + _STAMP_BYTES
     if end > size or (following < size and data[following] not in _MAGICS):
         return None
-    return Frame(start, end, message, data[sender], data[sender + 1], payload)
+    return Frame(start, end, message, data[number + 1], data[number + 2], payload, data[number])

@@ -167,6 +167,12 @@ def test_the_log_file_beside_a_data_file_is_read_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.complete
+def test_a_vehicle_that_is_not_in_the_log_cannot_be_chosen(takeoff: Path) -> None:
+    result = analyze(takeoff, "--vehicle", "9")
+    assert result.exit_code == 1
+    assert "has no vehicle 9, only 31" in result.stderr
+
+
 def test_files_that_cannot_be_read_or_written_are_named(takeoff: Path, tmp_path: Path) -> None:
     missing = analyze(tmp_path / "missing.bin")
     assert missing.exit_code == 1

@@ -1,10 +1,13 @@
 """`gainline import`: the same service as the upload, on the same database."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
+from pymavlink.dialects.v10 import paparazzi
+from pymavlink.dialects.v20 import ardupilotmega
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
@@ -12,7 +15,8 @@ from app.common.settings import Settings
 from app.db.session import Database
 from tests.builders import Json, create_ready_campaign, create_trial, get
 from tests.logs.paparazzi_flights import Flight, write
-from tests.logs.recorded import LOGS
+from tests.logs.recorded import LOGS, Telemetry
+from tests.logs.written_tlog import together
 
 TUNED_LOG, LOG = LOGS / "paparazzi_1624_1356_195.tlog", LOGS / "paparazzi_283_13_82.tlog"
 
@@ -90,6 +94,44 @@ def test_two_takeoffs_are_listed_and_one_is_taken_by_its_number(
     assert "The log contains 2 takeoffs" in listed.stderr
     assert "2: " in listed.stderr
     assert run(settings, both, "--campaign", "Garage", "--takeoff", 2).exit_code == 0
+
+
+@pytest.mark.complete
+def test_the_takeoffs_of_two_vehicles_are_listed_with_their_system_ids(
+    client: TestClient, settings: Settings, campaign: Json, tmp_path: Path
+) -> None:
+    log = Telemetry(ardupilotmega, autopilot=3, system=1)
+    log.heartbeat()
+    log.fly(2.0, to_m=0.0)
+    log.fly(5.0, to_m=3.0)
+    both = tmp_path / "both.tlog"
+    both.write_bytes(log.content + LOG.read_bytes())
+    listed = run(settings, both, "--campaign", "Garage")
+    assert listed.exit_code == 1
+    numbers = re.findall(r"([12]): system (\d+),", listed.stderr)
+    assert sorted(system for _, system in numbers) == ["1", "31"]
+    number = next(number for number, system in numbers if system == "31")
+    assert run(settings, both, "--campaign", "Garage", "--takeoff", number).exit_code == 0
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"][0]["error"] == pytest.approx(
+        0.3297, abs=5e-5
+    )
+
+
+@pytest.mark.complete
+def test_a_companion_computer_on_board_changes_nothing(
+    client: TestClient, settings: Settings, campaign: Json, tmp_path: Path
+) -> None:
+    companion = Telemetry(paparazzi, autopilot=9)
+    companion.now_s = 0.0
+    for _ in range(80):
+        companion.now_s += 1.0
+        companion.component("heartbeat", 2, 9, 0, 0, 4)
+    log = tmp_path / "companion.tlog"
+    log.write_bytes(together(LOG.read_bytes(), companion.content))
+    assert run(settings, log, "--campaign", "Garage").exit_code == 0
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"][0]["error"] == pytest.approx(
+        0.3297, abs=5e-5
+    )
 
 
 @pytest.mark.complete

@@ -93,15 +93,15 @@ class ULogFile:
 class Telemetry:
     """A telemetry log under construction: messages of a vehicle and of a ground station, in one time."""
 
-    def __init__(self, dialect: Any, *, autopilot: int, system: int = 31) -> None:
+    def __init__(self, dialect: Any, *, autopilot: int, system: int = 31, component: int = 1) -> None:
         self._dialect = dialect
         self._autopilot = autopilot
-        self._vehicle = dialect.MAVLink(None, srcSystem=system, srcComponent=1)
-        self._component = dialect.MAVLink(None, srcSystem=system, srcComponent=154)
-        self._ground = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+        self._senders: dict[tuple[int, int], Any] = {}
+        self._address = system, component
         self._content = io.BytesIO()
         self.now_s = 100.0
         self.booted_s = 0.0
+        self.began_us = BEGAN_US
         self._altitude_m = 0.0
 
     @property
@@ -109,14 +109,14 @@ class Telemetry:
         return self._content.getvalue()
 
     def vehicle(self, kind: str, *fields: object) -> None:
-        self._add(self._vehicle, kind, fields)
+        self.add(self._address, kind, *fields)
 
     def component(self, kind: str, *fields: object) -> None:
         """A message of another component of the vehicle."""
-        self._add(self._component, kind, fields)
+        self.add((self._address[0], 154), kind, *fields)
 
     def ground(self, kind: str, *fields: object) -> None:
-        self._add(self._ground, kind, fields)
+        self.add((255, 190), kind, *fields)
 
     def heartbeat(self, *, armed: bool = True, mode: int = 0) -> None:
         self.vehicle("heartbeat", 2, self._autopilot, 128 if armed else 0, mode, 4)
@@ -135,7 +135,14 @@ class Telemetry:
     def boot_ms(self) -> int:
         return round(1000 * (self.now_s - self.booted_s))
 
-    def _add(self, sender: Any, kind: str, fields: tuple[object, ...]) -> None:
+    def sender(self, address: tuple[int, int]) -> Any:
+        """The library's side of a system and component."""
+        return self._senders.setdefault(address, self._dialect.MAVLink(None, *address))
+
+    def add(self, address: tuple[int, int], kind: str, *fields: object) -> None:
+        """A message of this system and component."""
+        sender = self.sender(address)
         message = getattr(sender, f"{kind}_encode")(*fields)
-        self._content.write(struct.pack(">Q", BEGAN_US + round(self.now_s * 1e6)))
+        self._content.write(struct.pack(">Q", self.began_us + round(self.now_s * 1e6)))
         self._content.write(message.pack(sender))
+        sender.seq = (sender.seq + 1) % 256

@@ -164,3 +164,10 @@ def repeated_and_late(content: bytes, *, seed: int = 1) -> bytes:
     again = np.flatnonzero(random.random(len(records)) < 0.1)
     order = np.argsort(np.append(places, places[again] + 3.5), kind="stable")
     return b"".join(np.array([*records, *(records[each] for each in again)], dtype=object)[order])
+
+
+def together(*contents: bytes) -> bytes:
+    """One log of several, in order of receipt."""
+    records: list[bytes] = [record for content in contents for record in frames_of(content)]
+    records.sort(key=lambda record: record[:8])
+    return b"".join(records)
