@@ -5,7 +5,7 @@ readings that explain it are found by trying them, the fewest at a time.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import product
 from typing import Final
@@ -51,11 +51,11 @@ class Implausible(StrEnum):
 
 
 _SENTENCES: Final[Mapping[Implausible, str]] = {
-    Implausible.CONSTANT: "it has no more altitudes than the flight has set points, the highest {:.2f} m",
-    Implausible.OFF_GROUND: "it begins at {:.2f} m, not within {:g} m of the ground",
-    Implausible.MOVING: "it moves by {:.2f} m in the second before the command, by more than {:g} m",
-    Implausible.TOO_LOW: "it rises by {:.2f} m, less than {:g} m",
-    Implausible.TOO_HIGH: "it is at {:.2f} m for half of the time, above {:g} m",
+    Implausible.CONSTANT: "it has no more altitudes than the flight has set points, the highest {:z.2f} m",
+    Implausible.OFF_GROUND: "it begins at {:z.2f} m, not within {:g} m of the ground",
+    Implausible.MOVING: "it moves by {:z.2f} m in the second before the command, by more than {:g} m",
+    Implausible.TOO_LOW: "it rises by {:z.2f} m, less than {:g} m",
+    Implausible.TOO_HIGH: "it is at {:z.2f} m for half of the time, above {:g} m",
 }
 
 
@@ -146,9 +146,10 @@ def find_implausible(expected: ExpectedFlight, record: Trajectory) -> tuple[Find
 def find_readings(expected: ExpectedFlight, record: Trajectory) -> tuple[Reading, ...]:
     """The fewest readings with which the record shows a flight of the experiment, without gaps, and nearer to the
     commanded height than without them. Empty if there are none."""
+    altitude = replace(record, channels={ALTITUDE: record[ALTITUDE]})
     allowed = min(_miss(expected, record), _EXPLAINED_SHARE)
     for chosen in _COMBINATIONS[1:]:
-        tried = read_as(record, chosen)
+        tried = read_as(altitude, chosen)
         if _miss(expected, tried) < allowed and not find_implausible(expected, tried):
             try:
                 require_scorable(tried, ALTITUDE, expected.begin_s, expected.end_s)
