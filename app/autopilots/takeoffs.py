@@ -9,6 +9,7 @@ the log contains one, else at lift-off; it ends with the landing command, a chan
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Final
 
 import numpy as np
@@ -46,7 +47,8 @@ class Takeoff:
     `trajectory` is its record, with time counted from its beginning; `gains` are those used then, empty if not in the
     log; `gain_names` are those of its autopilot, empty if the format has none; `notes` explain how both were read.
     `start_s` is in seconds since the log's first sample. A takeoff that is not `is_commanded` begins at lift-off: its
-    error is over another window than that of a commanded one, and not comparable with it.
+    error is over another window than that of a commanded one, and not comparable with it. `started_at` is when it
+    began, in UTC, by the log's clock; None if the log has no date.
     """
 
     number: int
@@ -57,6 +59,7 @@ class Takeoff:
     gain_names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     is_commanded: bool = True
+    started_at: datetime | None = None
 
     @property
     def summary(self) -> str:

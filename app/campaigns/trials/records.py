@@ -5,7 +5,8 @@ A record is scored as it is stored, in single precision.
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -165,6 +166,11 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
+_FIRST_FLIGHTS: Final = datetime(2005, 1, 1, tzinfo=UTC)
+"""No autopilot that is read is older; a clock that was not set shows 1970 or 1980."""
+_CLOCKS_DIFFER: Final = timedelta(hours=14)
+"""A log in local time is at most that much ahead of UTC."""
+
 _SINGLE_PRECISION: Final = 1e-6
 """Logs store gains as single-precision numbers."""
 
@@ -212,6 +218,18 @@ def _settle_gains(session: Session, row: TrialRow, flown: Takeoff, *, confirmed:
     if (curve := row.predicted) is not None:
         row.predicted = None
         session.delete(curve)
+
+
+def _dated(flown: Takeoff) -> tuple[datetime, Takeoff]:
+    """When the takeoff was flown, and the takeoff whose record's source says from where that is known: from its log, if
+    the date there is possible, else it is taken for the present time."""
+    at, now = flown.started_at, utc_now()
+    if at is None:
+        return now, flown
+    is_possible = _FIRST_FLIGHTS <= at <= now + _CLOCKS_DIFFER
+    basis = "date by the log's clock, taken as UTC" if is_possible else f"date unknown: {at:%Y-%m-%d} in the log"
+    source = f"{flown.trajectory.source}; {basis}"
+    return at if is_possible else now, replace(flown, trajectory=replace(flown.trajectory, source=source))
 
 
 def _capture_import(session: Session, row: TrialRow, flown: Takeoff, accepted: Accepted) -> None:
@@ -262,7 +280,7 @@ def import_record(
     require_open(session, campaign, HISTORY_TRIAL_STATES)
     _settle_gains(session, row, flown, confirmed=accepted.confirm)
     proposals.start_flying(campaign)
-    row.flown_at = utc_now()
+    row.flown_at, flown = _dated(flown)
     _capture_import(session, row, flown, accepted)
     proposals.finish_flying(session, campaign)
     return trial_view(session, row)

@@ -1,5 +1,6 @@
 """Records that show no flight of the campaign: asked about, with what they may be read as, and not stored meanwhile."""
 
+from datetime import UTC, datetime, timedelta, timezone
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from app.common.errors import UnconfirmedError
 from app.common.states import TrialState
 from app.core.errors import InputError
 from app.core.records.trajectory import Samples, Trajectory
+from app.db.base import utc_now
 from app.db.models import TrialRow
 from app.db.session import Database
 from app.jobs import service as jobs
@@ -171,3 +173,28 @@ def test_an_error_of_zero_divides_nothing_and_a_failed_job_leaves_the_campaign_o
     status, flown = send(client, again, csv(CLIMB_M))
     assert (status, flown["state"]) == (201, "valid")
     assert "higher than the best before it" in flown["verdict"]
+
+
+@pytest.mark.parametrize(
+    ("started_at", "is_used"),
+    [
+        (None, False),
+        (datetime(2024, 5, 4, 10, 30, tzinfo=UTC), True),
+        (datetime(2024, 5, 4, 10, 30, tzinfo=timezone(timedelta(hours=2))), True),
+        (datetime(1970, 1, 1, 0, 5, tzinfo=UTC), False),
+        (datetime(1980, 1, 6, tzinfo=UTC), False),
+        (datetime(2106, 2, 7, tzinfo=UTC), False),
+    ],
+)
+def test_a_flight_was_flown_when_its_log_says(
+    client: TestClient, database: Database, trial: Json, started_at: datetime | None, is_used: bool
+) -> None:
+    flown = Takeoff(number=1, start_s=0.0, begins_with="the command", trajectory=CLIMB, gains={}, started_at=started_at)
+    before = utc_now()
+    with database.write() as session:
+        records.import_record(session, trial["id"], flown)
+    stored = get(client, f"/api/trials/{trial['id']}")
+    at = datetime.fromisoformat(stored["flown_at"])
+    assert (at == started_at) if is_used else (before <= at <= utc_now())
+    assert ("date by the log's clock, taken as UTC" in stored["record"]["source"]) == is_used
+    assert ("date unknown" in stored["record"]["source"]) == (started_at is not None and not is_used)
