@@ -239,7 +239,12 @@ def import_log(
         int | None, typer.Option(min=1, help="Number of the takeoff, if the log contains several.")
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Accept the gains in the log if they differ from the planned ones.")
+        bool,
+        typer.Option(
+            "--yes",
+            help="Answer every question with yes: accept gains that were not planned, read a record as it looks, store "
+            "one that does not count as an invalid flight.",
+        ),
     ] = False,
     data_dir: DataDir = None,
     json_out: JsonOut = None,

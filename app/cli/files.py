@@ -18,6 +18,7 @@ from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
 from app.campaigns import service as campaigns
 from app.campaigns.trials import records
+from app.campaigns.trials.record_doubts import Accepted
 from app.campaigns.trials.schemas import Trial
 from app.cli.console import console, reading, table, write_json, writing
 from app.common.errors import InputError, Problem, UnconfirmedError
@@ -41,7 +42,8 @@ def import_log(
     yes: bool,
     json_out: Path | None,
 ) -> None:
-    """Import the flight and print the trial's result; asks before it accepts gains that were not planned.
+    """Import the flight and print the trial's result; asks before it accepts gains that were not planned, reads the
+    record in another unit, or stores it as an invalid flight.
 
     Raises InputError for a log that cannot be used, UnconfirmedError when the command is not interactive and cannot
     ask.
@@ -93,25 +95,21 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
-    accepted: frozenset[str] = frozenset()
+    accepted = Accepted()
     while True:
         try:
             with database.write() as session:
-                return records.import_into_campaign(
-                    session,
-                    campaign,
-                    flown,
-                    number=trial,
-                    confirmed=yes or "confirm" in accepted,
-                    invalid=yes or "invalid" in accepted,
-                )
+                return records.import_into_campaign(session, campaign, flown, number=trial, accepted=accepted)
         except UnconfirmedError as needed:
-            if not can_ask():
+            before, accepted = accepted, accepted.answering(needed.problems)
+            if accepted == before:
+                raise
+            if not yes and not can_ask():
                 raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
             Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
-            if not typer.confirm("Import it?"):
+            question = "Import it?" if accepted.reads_as == before.reads_as else "Import it, read so?"
+            if not yes and not typer.confirm(question):
                 raise
-            accepted |= {problem.field for problem in needed.problems}
 
 
 def analyze_log(file: Path, *, gains: str, vehicle: int | None, json_out: Path | None, params_out: Path | None) -> None:

@@ -21,7 +21,7 @@ import csv
 import io
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Literal, Self, TypeVar
 
@@ -43,6 +43,7 @@ from app.common.schemas import OptionValue, Page
 from app.common.schemas import Problem as ProblemDetails
 from app.common.states import UNFLOWN_TRIAL_STATES, FlightState, TrialState
 from app.core.errors import GainlineError, Problem
+from app.core.records.plausibility import Reading
 from app.fleet.schemas import VehicleChoice
 
 Record = Path | bytes | Mapping[str, Iterable[float]]
@@ -187,25 +188,36 @@ class Client:
         *,
         note: str = "",
         invalid: bool = False,
+        reads_as: Iterable[Reading] = (),
     ) -> Trial:
         """Upload a flight flown elsewhere, with the gains it was flown with; returns it scored and classified.
 
-        `invalid` accepts a record that cannot be scored. Without it the trial stays planned, and ConflictError is
-        raised.
+        `invalid` accepts a record that cannot be scored or shows no such flight, `reads_as` what it may be read as.
+        Without them the trial stays planned, and ConflictError is raised.
         """
         trial = self._plan(campaign_id, flown, note=note, fly=None)
-        return self.upload(trial.id, record, invalid=invalid)
+        return self.upload(trial.id, record, invalid=invalid, reads_as=reads_as)
 
     def upload(
-        self, trial_id: int, record: Record, *, takeoff: int | None = None, confirm: bool = False, invalid: bool = False
+        self,
+        trial_id: int,
+        record: Record,
+        *,
+        takeoff: int | None = None,
+        confirm: bool = False,
+        invalid: bool = False,
+        reads_as: Iterable[Reading] = (),
     ) -> Trial:
         """Upload the record of a planned trial, or the recovered record of a lost flight.
 
         `takeoff` chooses one of a log with several takeoffs. `confirm` accepts a log that was flown with other gains;
-        the trial then has those. `invalid` accepts a record that cannot be scored, as an invalid flight. Raises
-        InvalidError that lists the takeoffs, ConflictError that names both gain sets or why the record has no score.
+        the trial then has those. `invalid` accepts a record that cannot be scored, or shows no flight of the campaign,
+        as an invalid flight; `reads_as` reads it in other units, with the other sign, above another datum. Raises
+        InvalidError that lists the takeoffs, ConflictError that names both gain sets, or why the record does not count
+        and, as the `code` of problems with the field `reads_as`, with what it would.
         """
-        query = {} if takeoff is None else {"takeoff": str(takeoff)}
+        query: dict[str, str | Sequence[str]] = {"reads_as": tuple(reads_as)}
+        query |= {} if takeoff is None else {"takeoff": str(takeoff)}
         query |= {name: "true" for name, accepted in (("confirm", confirm), ("invalid", invalid)) if accepted}
         return self._request(
             "POST",
@@ -308,7 +320,7 @@ class Client:
         *,
         content: bytes = b"",
         kind: str = "application/json",
-        query: Mapping[str, str] | None = None,
+        query: Mapping[str, str | Sequence[str]] | None = None,
     ) -> T:
         headers = {"Content-Type": kind, "Idempotency-Key": uuid.uuid4().hex} if method == "POST" else {}
         for left in reversed(range(_ATTEMPTS)):
@@ -339,7 +351,9 @@ def _refusal(answer: httpx2.Response) -> RefusedError:
             status=answer.status_code,
             hint="Check that the address belongs to a Gainline server of this version.",
         )
-    problems = tuple(Problem(problem.field, problem.reason, problem.offer) for problem in details.problems)
+    problems = tuple(
+        Problem(problem.field, problem.reason, problem.offer, problem.code) for problem in details.problems
+    )
     hint = details.script_hint or details.hint
     return kind(details.detail, hint=hint, problems=problems, status=details.status, title=details.title)
 

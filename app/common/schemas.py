@@ -88,11 +88,13 @@ class Request(Schema):
 
 class ProblemField(Schema):
     """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
-    pass, by name, where any are known."""
+    pass, by name, where any are known. `code` is the reason, or the value of the field that would pass, for programs;
+    empty where there is none."""
 
     field: str
     reason: str
     offer: Gains = {}
+    code: str = ""
 
 
 class Problem(Schema):

@@ -16,12 +16,14 @@ class Problem:
     """One refused field.
 
     `field` is its name as the caller wrote it (dotted, `gains.kp`), `reason` why it was refused; `offer` holds gains
-    that would pass, by name, if any are known.
+    that would pass, by name, if any are known. `code` tells programs what the reason is, or the value of the field that
+    would pass.
     """
 
     field: str
     reason: str
     offer: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    code: str = ""
 
 
 class GainlineError(Exception):

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 NOTHING: Final = "–"
+NEGLIGIBLE: Final = 1e-9
+"""An error that is no basis of a comparison: records, in single precision, resolve less."""
 
 GAIN_DIGITS: Final = 4
 EXACT_DIGITS: Final = 7
@@ -58,6 +60,11 @@ def percent(share: float, digits: int = 0) -> str:
     return f"{100.0 * share:.{digits}f}\u00a0%"
 
 
+def percent_of(difference: float, base: float) -> str:
+    """The size of a difference as a percentage of an error; empty where the error is too small to compare with."""
+    return percent(abs(difference) / base) if base > NEGLIGIBLE else ""
+
+
 def confidence_text(confidence: float) -> str:
     """`93 %`, `99.7 %` or `more than 99.9 %`, never certainty; as on the pages."""
     return (
@@ -66,7 +73,9 @@ def confidence_text(confidence: float) -> str:
 
 
 def relative_to(value: float, base: float) -> str:
-    """An error compared with a positive one, as on the pages: `72 % lower`, `12 % higher`, `4.1 times as high`."""
+    """An error compared with another, as on the pages: `72 % lower`, `12 % higher`, `4.1 times as high`."""
+    if base <= NEGLIGIBLE:
+        return "the same" if value <= NEGLIGIBLE else "higher"
     change = value / base - 1.0
     if abs(change) < 0.005:
         return "the same"

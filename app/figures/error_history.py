@@ -321,7 +321,8 @@ class ErrorsFigure(CampaignFigure):
             return "No valid flight yet."
         first = self.history.valid[0]
         lowest = min(errors)
-        share = "" if best is first else f", {100 * (1 - lowest / errors[0]):.0f} % below flight {first.number}"
+        has_share = best is not first and errors[0] > formatting.NEGLIGIBLE
+        share = f", {100 * (1 - lowest / errors[0]):.0f} % below flight {first.number}" if has_share else ""
         return f"Best error {formatting.short(lowest)} {self.history.error_unit} in flight {best.number}{share}."
 
     def _table(self) -> Table:

@@ -11,6 +11,7 @@ from app.autopilots.takeoffs import Takeoff
 from app.campaigns import service as campaigns
 from app.campaigns.history import set_campaign_state
 from app.campaigns.schemas import Campaign, Definition, NewCampaign, StopRule
+from app.campaigns.trials.record_doubts import Accepted
 from app.campaigns.trials.records import plan_and_import
 from app.campaigns.trials.schemas import TrialPlan
 from app.campaigns.trials.service import evaluate_gate
@@ -29,6 +30,7 @@ from app.reproductions.controller import RECORDED_TAKEOFF
 
 UNNAMED: Final = "Log"
 _FURTHER_FLIGHTS: Final = 6
+_ANY_RECORD: Final = Accepted(confirm=True, invalid=True)
 
 
 def analyze_upload(content: bytes, companion: bytes | None, *, name: str, gains: str = "") -> LogAnalysis:
@@ -90,5 +92,5 @@ def start_campaign(
         passed = evaluate_gate(session, row.id, each.gains).passed  # if not, the record corrects the gains
         planned = dict(each.gains) if passed else Experiment.space.mapping(Experiment.space.default)
         plan = TrialPlan(gains=planned, note=f"Takeoff {each.number} of {name}")
-        plan_and_import(session, row.id, plan, records[each.number], context, confirmed=True, invalid=False)
+        plan_and_import(session, row.id, plan, records[each.number], context, accepted=_ANY_RECORD)
     return campaigns.get_campaign(session, row.id)

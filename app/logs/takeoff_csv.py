@@ -28,6 +28,8 @@ _REQUIRED: Final = ("time_s", "altitude_m")
 _MISSING: Final = ("", "nan")
 _MAX_LINE_BYTES: Final = 4096
 _LARGEST: Final = 1e6
+_LATEST: Final = 1e9
+"""Of the times: some programs write microseconds."""
 
 _FORMAT_HINT: Final = (
     "Save the flight as CSV in UTF-8 with the header time_s,altitude_m, commas between values and "
@@ -158,7 +160,7 @@ def _value(text: str, line: int, column: str) -> float:
         raise refused(f"is not a number: {text.strip()[:40]!r}", _ROW_HINT, field=where) from error
     if not math.isfinite(value) or "_" in text:
         raise refused(f"is not a finite number: {text.strip()[:40]!r}", _ROW_HINT, field=where)
-    if abs(value) > _LARGEST:
+    if abs(value) > (_LATEST if column == "time_s" else _LARGEST):
         raise refused(
             f"is outside the range of a takeoff: {value:g}",
             "Count time from the command and use metres and seconds.",

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from pymavlink.dialects.v10 import paparazzi
@@ -13,7 +14,7 @@ from typer.testing import CliRunner, Result
 from app.cli.commands import app
 from app.common.settings import Settings
 from app.db.session import Database
-from tests.builders import Json, create_ready_campaign, create_trial, get
+from tests.builders import Json, climb_error, create_climb, create_ready_campaign, create_trial, csv_of, get
 from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import LOGS, Telemetry
 from tests.logs.written_tlog import together
@@ -81,6 +82,34 @@ def test_a_question_can_be_answered(
     accepted = CliRunner().invoke(app, asked, input="y\n")
     assert accepted.exit_code == 0, accepted.stderr
     assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"][0]["gains"]["kp"] == 290
+
+
+def test_what_a_record_looks_like_is_asked_and_it_is_read_so(
+    client: TestClient, settings: Settings, campaign: Json, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    climb = create_climb()
+    file = tmp_path / "flight.csv"
+    file.write_bytes(csv_of({"time_s": climb.time_s, "altitude_m": 100.0 * climb["altitude_m"]}))
+    refused = run(settings, file, "--campaign", "Garage")
+    assert (refused.exit_code, "looks like one with altitude in centimetres" in refused.stderr) == (1, True)
+    monkeypatch.setattr("app.cli.files.can_ask", lambda: True)
+    asked = ["import", str(file), "--campaign", "Garage", "--data-dir", str(settings.data_dir)]
+    declined = CliRunner().invoke(app, asked, input="n\n")
+    assert (declined.exit_code, "Import it, read so?" in declined.output) == (1, True)
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["total"] == 0
+    accepted = CliRunner().invoke(app, asked, input="y\n")
+    assert accepted.exit_code == 0, accepted.stderr
+    (trial,) = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
+    assert (trial["state"], trial["error"]) == ("valid", pytest.approx(climb_error(1.0), abs=1e-3))
+    assert trial["record"]["source"] == "csv; read with altitude in centimetres"
+
+
+def test_yes_stores_what_shows_no_flight_as_invalid(settings: Settings, campaign: Json, tmp_path: Path) -> None:
+    climb = create_climb()
+    file = tmp_path / "flight.csv"
+    file.write_bytes(csv_of({"time_s": climb.time_s, "altitude_m": np.full_like(climb.time_s, 3.0)}))
+    stored = run(settings, file, "--campaign", "Garage", "--yes")
+    assert (stored.exit_code, "invalid, no error" in stored.stdout) == (0, True)
 
 
 @pytest.mark.complete

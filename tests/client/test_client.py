@@ -20,6 +20,7 @@ from app.client import (
     UnavailableError,
 )
 from app.common.settings import Settings
+from app.core.records.plausibility import Reading
 from app.db.session import Database
 from app.flights import flight_rows
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
@@ -49,7 +50,9 @@ def test_ask_and_tell(gainline: Client, database: Database, tmp_path: Path) -> N
     file.write_bytes(create_csv(1.5))
     assert gainline.tell(campaign.id, gainline.ask(campaign.id), file).number == 2
     run_jobs(database)
-    assert gainline.tell(campaign.id, {"kp": 300, "ki": 20, "kd": 90}, create_csv(1.4)).kind == "manual"
+    in_feet = {**record, "altitude_m": climb["altitude_m"] / 0.3048}
+    by_hand = {"kp": 300, "ki": 20, "kd": 90}
+    assert gainline.tell(campaign.id, by_hand, in_feet, reads_as=[Reading.FEET]).kind == "manual"
     assert [found.number for found in gainline.trials(campaign.id)] == [1, 2, 3]
     assert gainline.trajectory(trial.id, points=100).samples == 1651
     assert gainline.trajectory_csv(trial.id).startswith(b"time_s,altitude_m\n")

@@ -12,6 +12,7 @@ from app.core.formatting import (
     named_flights,
     number,
     percent,
+    percent_of,
     plus_minus,
     relative_to,
     setting_text,
@@ -63,6 +64,8 @@ def test_a_share_is_held_together_by_a_space_that_does_not_break() -> None:
 def test_an_error_is_told_relative_to_another() -> None:
     assert [relative_to(value, 0.5) for value in (0.139, 0.56, 2.075, 0.5001)] == [
         "72\u00a0% lower", "12\u00a0% higher", "4.2 times as high", "the same"]  # fmt: skip
+    assert [relative_to(value, 0.0) for value in (0.0, 1e-300, 0.1)] == ["the same", "the same", "higher"]
+    assert [percent_of(-0.1, base) for base in (0.5, 0.0, 1e-300)] == ["20\u00a0%", "", ""]
 
 
 def test_a_number_that_rounds_to_zero_has_no_sign() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.builders import climb_error, create_climb, csv_of
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard, printed
 from tests.e2e.states import States
@@ -181,6 +182,23 @@ def test_a_campaign_flown_elsewhere_takes_records_as_csv(dashboard: Dashboard, s
     assert trial["error"] == pytest.approx(flown["error"], abs=1e-6)
     dashboard.wait_for_flight(1)
     assert_drawn_as_recorded(dashboard, trial)
+
+
+def test_a_record_in_another_unit_and_datum_is_offered_to_be_read_so(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign("import")
+    dashboard.open_campaign(campaign_id)
+    climb = create_climb()
+    content = csv_of({"time_s": climb.time_s, "altitude_m": climb["altitude_m"] / 0.3048 + 1417.0})
+    with dashboard.page.expect_file_chooser() as chooser:
+        dashboard.button("Upload flight record").click()
+    chooser.value.set_files({"name": "flight.csv", "mimeType": "text/csv", "buffer": content})
+    expect(dashboard.page.get_by_role("alert")).to_contain_text("It looks like one with altitude in feet and")
+    expect(dashboard.button("Store as an invalid flight")).to_be_visible()
+    assert dashboard.trials(campaign_id) == []
+    dashboard.button("Read it with altitude in feet, altitude above another level").click()
+    dashboard.wait_for_flight(1)
+    [trial] = dashboard.trials(campaign_id)
+    assert (trial["state"], trial["error"]) == ("valid", pytest.approx(climb_error(1.0), abs=1e-3))
 
 
 def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard, states: States) -> None:

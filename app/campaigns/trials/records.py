@@ -5,7 +5,8 @@ A record is scored as it is stored, in single precision.
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -14,12 +15,19 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
-from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
+from app.autopilots.takeoffs import Takeoff
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.flight_predictions import TrialPredictor
 from app.campaigns.history import set_trial_state
+from app.campaigns.trials.record_doubts import (
+    UNSCORABLE,
+    Accepted,
+    find_doubts,
+    reason_of,
+    unconfirmed,
+)
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.campaigns.trials.schemas import Trial, TrialPlan
 from app.campaigns.trials.service import create_trial, gated_gains, require_open
@@ -41,6 +49,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, count, format_gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.metrics import StepResponse, step_response
+from app.core.records.plausibility import Reading, find_readings, read_as
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import battery_v
 from app.db import trajectories
@@ -157,6 +166,11 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
+_FIRST_FLIGHTS: Final = datetime(2005, 1, 1, tzinfo=UTC)
+"""No autopilot that is read is older; a clock that was not set shows 1970 or 1980."""
+_CLOCKS_DIFFER: Final = timedelta(hours=14)
+"""A log in local time is at most that much ahead of UTC."""
+
 _SINGLE_PRECISION: Final = 1e-6
 """Logs store gains as single-precision numbers."""
 
@@ -206,18 +220,32 @@ def _settle_gains(session: Session, row: TrialRow, flown: Takeoff, *, confirmed:
         session.delete(curve)
 
 
-def _capture_import(session: Session, row: TrialRow, flown: Takeoff, *, invalid: bool) -> None:
-    """Capture the record, as an invalid one if it begins at lift-off. Unless `invalid`, raises UnconfirmedError for a
-    record that nobody's judgement can make valid, such as one that ends too early."""
-    refusal = "" if flown.is_commanded else NOT_COMMANDED
-    unscorable = refusal or score(experiment_of_campaign(row.campaign), flown.trajectory, accept_gaps=True).refusal
-    if unscorable and not invalid:
-        raise UnconfirmedError(
-            f"The record is {refusal}." if refusal else f"The record cannot be scored: {unscorable}.",
-            hint="Choose the complete log of this flight, or confirm that it is stored as an invalid flight.",
-            problems=(Problem("invalid", unscorable),),
-        )
-    capture(session, row, flown.trajectory, ending="invalid" if refusal else "completed", reason=refusal)
+def _dated(flown: Takeoff) -> tuple[datetime, Takeoff]:
+    """When the takeoff was flown, and the takeoff whose record's source says from where that is known: from its log, if
+    the date there is possible, else it is taken for the present time."""
+    at, now = flown.began_at, utc_now()
+    if at is None:
+        return now, flown
+    is_possible = _FIRST_FLIGHTS <= at <= now + _CLOCKS_DIFFER
+    basis = "date by the log's clock, taken as UTC" if is_possible else f"date unknown: {at:%Y-%m-%d} in the log"
+    source = f"{flown.trajectory.source}; {basis}"
+    return at if is_possible else now, replace(flown, trajectory=replace(flown.trajectory, source=source))
+
+
+def _capture_import(session: Session, row: TrialRow, flown: Takeoff, accepted: Accepted) -> None:
+    """Capture the record, as an invalid one if it begins at lift-off or is implausible. Unless that is accepted, raises
+    UnconfirmedError for such a record, and for one that cannot be scored, or, of a flight flown elsewhere, has gaps."""
+    experiment = experiment_of_campaign(row.campaign)
+    expected = None if row.state == TrialState.LOST or not flown.is_commanded else experiment.expected
+    record = read_as(flown.trajectory, accepted.reads_as)
+    unscorable = score(experiment, record, accept_gaps=expected is None).refusal
+    doubts = find_doubts(expected, record, unscorable, is_commanded=flown.is_commanded)
+    if doubts and not accepted.invalid:
+        readings = () if expected is None else find_readings(expected, record)
+        is_in_si = bool(flown.gain_names)  # an autopilot's log, in which only the datum may be another
+        raise unconfirmed(doubts, readings if not is_in_si or readings == (Reading.OTHER_DATUM,) else ())
+    ending: Ending = "completed" if not doubts or doubts[0].code == UNSCORABLE else "invalid"
+    capture(session, row, record, ending=ending, reason=reason_of(doubts))
 
 
 def import_record(
@@ -226,23 +254,22 @@ def import_record(
     flown: Takeoff,
     context: RequestContext = LOCAL_CLI,
     *,
-    confirmed: bool = False,
-    invalid: bool = False,
+    accepted: Accepted | None = None,
 ) -> Trial:
     """Import the record of a flight flown elsewhere, or the recovered record of a lost flight; score and classify it.
 
-    Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
-    that is not `confirmed`, or when it cannot be scored and nobody has asked to store it as `invalid`, TrajectoryError
-    when the record cannot be stored, NotAllowedError when the client may not command a real vehicle.
+    Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains, or
+    the record cannot be scored or is implausible, and that is not `accepted`, TrajectoryError when the record cannot be
+    stored, NotAllowedError when the client may not command a real vehicle.
     """
-    row = history.trial_row(session, trial_id)
+    row, accepted = history.trial_row(session, trial_id), accepted or Accepted()
     campaign = row.campaign
     require_may(Permission.REVIEW, campaign.vehicle, context)
     check_action(TRIAL_ACTIONS, "upload", row.state, f"Flight {row.number}")
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
-        _settle_gains(session, row, flown, confirmed=confirmed)
-        _capture_import(session, row, flown, invalid=invalid)
+        _settle_gains(session, row, flown, confirmed=accepted.confirm)
+        _capture_import(session, row, flown, accepted)
         proposals.history_changed(session, campaign)
         return trial_view(session, row)
     if fleet.can_fly(campaign.vehicle):
@@ -251,10 +278,10 @@ def import_record(
             hint="Fly it, or choose a campaign whose vehicle is “Flown elsewhere”.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
-    _settle_gains(session, row, flown, confirmed=confirmed)
+    _settle_gains(session, row, flown, confirmed=accepted.confirm)
     proposals.start_flying(campaign)
-    row.flown_at = utc_now()
-    _capture_import(session, row, flown, invalid=invalid)
+    row.flown_at, flown = _dated(flown)
+    _capture_import(session, row, flown, accepted)
     proposals.finish_flying(session, campaign)
     return trial_view(session, row)
 
@@ -266,17 +293,16 @@ def plan_and_import(
     flown: Takeoff,
     context: RequestContext = LOCAL_CLI,
     *,
-    confirmed: bool,
-    invalid: bool,
+    accepted: Accepted,
     predictor: TrialPredictor | None = None,
 ) -> Trial:
     """Plan a trial and import its record. Raises what `create_trial` and `import_record` raise."""
     planned = create_trial(session, campaign_id, plan, context, predictor=predictor)
-    return import_record(session, planned.id, flown, context, confirmed=confirmed, invalid=invalid)
+    return import_record(session, planned.id, flown, context, accepted=accepted)
 
 
 def import_into_campaign(
-    session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool, invalid: bool
+    session: Session, campaign: str, flown: Takeoff, *, number: int | None, accepted: Accepted
 ) -> Trial:
     """Import a record for the trial of the given number, else for the one that waits for a record.
 
@@ -300,14 +326,14 @@ def import_into_campaign(
             problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
         )
     if chosen:
-        return import_record(session, chosen[0].id, flown, confirmed=confirmed, invalid=invalid)
+        return import_record(session, chosen[0].id, flown, accepted=accepted)
     if row.state == CampaignState.FINISHED:
         raise ConflictError(
             f"Campaign {campaign_id} has ended.", hint="Reopen it on its page to import another flight, then try again."
         )
     proposal = proposals.require_fresh_proposal(session, row)
     plan = TrialPlan(proposal_id=proposal.id)
-    return plan_and_import(session, campaign_id, plan, flown, confirmed=confirmed, invalid=invalid)
+    return plan_and_import(session, campaign_id, plan, flown, accepted=accepted)
 
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:

@@ -5,9 +5,11 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 
+from app.autopilots.takeoffs import Takeoff
 from app.campaigns.flight_predictions import PredictorCache, TrialPredictor
 from app.campaigns.schemas import Campaign, ConsideredGains
 from app.campaigns.trials import photos, records, reviews, service
+from app.campaigns.trials.record_doubts import Accepted
 from app.campaigns.trials.schemas import (
     AbortJudgement,
     Classification,
@@ -165,13 +167,12 @@ uploads = APIRouter(prefix="/api", tags=["trials"])
 """A router of its own, because the request bodies are not JSON."""
 
 
-TakeoffNumber = Annotated[int | None, Query(ge=1, le=10_000, description="number of the takeoff in a log with several")]
-OtherGains = Annotated[
-    bool, Query(description="accept a log that was flown with other gains; the trial takes the gains in the log")
-]
-Unscored = Annotated[
-    bool, Query(description="accept a record that cannot be scored, for instance because it ends too early")
-]
+AcceptedQuery = Annotated[Accepted, Query()]
+
+
+def _takeoff_in(record: Record, accepted: Accepted) -> Takeoff:
+    content, companion = record.content(), record.read_companion()
+    return records.read_upload(content, name=record.name, takeoff=accepted.takeoff, companion=companion)
 
 
 @uploads.post(
@@ -181,18 +182,16 @@ def import_flight(
     record: Record,
     asking: RequestContextDep,
     predictor: TrialPredictorDep,
+    accepted: AcceptedQuery,
     campaign_id: Id,
-    takeoff: TakeoffNumber = None,
-    confirm: OtherGains = False,
-    invalid: Unscored = False,
 ) -> Trial:
     """Plan the trial in the form field `trial` and upload its record, as one operation: nothing is planned when the
     record is refused."""
     plan = record.read_field("trial", TrialPlan)
-    flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
+    flown = _takeoff_in(record, accepted)
     return record.once(
         lambda session: records.plan_and_import(
-            session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid, predictor=predictor
+            session, campaign_id, plan, flown, asking, accepted=accepted, predictor=predictor
         ),
         ahead=lambda session: service.prepare_trial(session, campaign_id, plan, predictor),
     )
@@ -202,10 +201,8 @@ def import_flight(
 def upload_trajectory(
     record: Record,
     asking: RequestContextDep,
+    accepted: AcceptedQuery,
     trial_id: Id,
-    takeoff: TakeoffNumber = None,
-    confirm: OtherGains = False,
-    invalid: Unscored = False,
 ) -> Trial:
     """Upload the record of a flight flown elsewhere, or the recovered record of a lost flight.
 
@@ -213,10 +210,8 @@ def upload_trajectory(
     which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
     and optionally the other channels, at most 200 000 rows. It is scored and classified at once.
     """
-    flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
-    return record.once(
-        lambda session: records.import_record(session, trial_id, flown, asking, confirmed=confirm, invalid=invalid)
-    )
+    flown = _takeoff_in(record, accepted)
+    return record.once(lambda session: records.import_record(session, trial_id, flown, asking, accepted=accepted))
 
 
 @uploads.post("/trials/{trial_id}/photos", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)

@@ -18,7 +18,7 @@ from app.common.conflict_checks import allowed
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight, Interval
 from app.core.experiments.base import Scatter
-from app.core.formatting import named_flights, percent, short
+from app.core.formatting import named_flights, percent_of, short
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS
@@ -186,8 +186,8 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
         return f"the same as {than}"
     gain = best - error
     relation = "lower than" if gain > 0 else "higher than"
-    share = f" ({percent(abs(gain) / best)})" if best else ""
-    return f"{short(abs(gain))} {unit}{share} {relation} {than}"
+    share = percent_of(gain, best)
+    return f"{short(abs(gain))} {unit}{share and f' ({share})'} {relation} {than}"
 
 
 def _may_be_valid(row: TrialRow) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from app.core.definition import Flight, Option, OptionValue
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, PolicySpace, Vector
+from app.core.records.plausibility import ExpectedFlight
 from app.core.records.trajectory import Samples, Trajectory
 
 
@@ -263,6 +264,13 @@ class Experiment(ABC):
     def set_point(self, time_s: Samples) -> Samples:
         """Set point of the scored output, same shape as `time_s`; zero before the command, and without set points."""
         return np.zeros_like(time_s) if self.set_points is None else self.set_points.at(time_s)
+
+    @property
+    def expected(self) -> ExpectedFlight | None:
+        """What a record from elsewhere must show to be one of its flights. None: nothing but what the score needs."""
+        if self.set_points is None:
+            return None
+        return ExpectedFlight(set_point=self.set_points.at, begin_s=self.scored_from_s, end_s=self.window_s)
 
     def scored_flight(self, number: int, gains: Gains, trajectory: Trajectory) -> Flight:
         """A valid flight with this record. Raises TrajectoryError if it cannot be scored."""

@@ -24,6 +24,7 @@ import {
   type NewCampaignInput,
   type NewTrial,
   promoteBest,
+  type Reading,
   type Reopening,
   rehearseCampaign,
   reopenCampaign,
@@ -123,8 +124,10 @@ export interface RecordOrder extends RecordFiles {
   takeoff?: number;
   /** Accept the log's gains although they differ from the planned ones. */
   confirm?: boolean;
-  /** Store a record that cannot be scored, as an invalid flight. */
+  /** Store a record that cannot be scored or is implausible, as an invalid flight. */
   invalid?: boolean;
+  /** Read the record in these units, with this sign, above this datum. */
+  reads_as?: Reading[];
 }
 
 /** Upload the record of a flight made elsewhere: of a planned trial, or with the trial to plan. */

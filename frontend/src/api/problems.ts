@@ -3,6 +3,8 @@
 export interface FieldProblem {
   field: string;
   reason: string;
+  /** What the reason is, or the value of the field that would be accepted. */
+  code?: string;
 }
 
 export interface Problem {
@@ -59,8 +61,10 @@ function fieldProblems(value: unknown): FieldProblem[] {
   if (!Array.isArray(value)) return [];
   return value
     .map(record)
-    .flatMap(({ field, reason }) =>
-      typeof field === "string" && typeof reason === "string" ? [{ field, reason }] : [],
+    .flatMap(({ field, reason, code }) =>
+      typeof field === "string" && typeof reason === "string"
+        ? [text(code) === "" ? { field, reason } : { field, reason, code: text(code) }]
+        : [],
     );
 }
 

@@ -1,9 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { type Problem, problemFrom } from "./problems";
-import { confirmationIn, recordOf, takeoffsIn } from "./records";
+import { confirmationIn, readingsIn, recordOf, takeoffsIn } from "./records";
 
 const named = (name: string): File => new File(["content"], name);
-const refusal = (problems: { field: string; reason: string }[]): Problem => problemFrom(422, { title: "No", problems });
+const refusal = (problems: { field: string; reason: string; code?: string }[]): Problem =>
+  problemFrom(422, { title: "No", problems });
 
 describe("the chosen files", () => {
   it("are a record and its companion, in any order", () => {
@@ -42,6 +43,18 @@ describe("what the server asks", () => {
 
   it("is whether a record that cannot be scored shall be stored", () => {
     expect(confirmationIn(refusal([{ field: "invalid", reason: "ends too early" }]))).toBe("invalid");
+  });
+
+  it("is what the record shall be read with, where that makes it a flight", () => {
+    const problem = refusal([
+      { field: "reads_as", reason: "looks like altitude in feet", code: "feet" },
+      { field: "reads_as", reason: "looks like altitude above another level", code: "other-datum" },
+      { field: "reads_as", reason: "looks like something newer than this page", code: "furlongs" },
+      { field: "invalid", reason: "it begins at 1417.00 m", code: "off ground" },
+    ]);
+    expect(readingsIn(problem)).toEqual(["feet", "other-datum"]);
+    expect(confirmationIn(problem)).toBe("invalid");
+    expect(readingsIn(refusal([{ field: "invalid", reason: "ends too early", code: "unscorable" }]))).toEqual([]);
   });
 
   it("is nothing when something else was refused", () => {

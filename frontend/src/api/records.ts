@@ -2,7 +2,7 @@
 
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
-import { addPhoto, deletePhoto, editTrial, listPhotos, type Trial } from "./generated";
+import { addPhoto, deletePhoto, editTrial, listPhotos, type Reading, type Trial } from "./generated";
 import type { Problem } from "./problems";
 
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
@@ -40,6 +40,23 @@ export function takeoffsIn(problem: Problem | null): Takeoff[] {
 export function confirmationIn(problem: Problem | null): "confirm" | "invalid" | null {
   const fields = (problem?.problems ?? []).map(({ field }) => field);
   return (["confirm", "invalid"] as const).find((field) => fields.includes(field)) ?? null;
+}
+
+/** How a record may be read that the server takes for no flight of the campaign as it is. */
+export const READINGS: Readonly<Record<Reading, string>> = {
+  milliseconds: "time in milliseconds",
+  microseconds: "time in microseconds",
+  centimetres: "altitude in centimetres",
+  millimetres: "altitude in millimetres",
+  feet: "altitude in feet",
+  "down-positive": "altitude positive down",
+  "other-datum": "altitude above another level",
+};
+
+/** The readings that the server offers; all of them together make the record a flight of the campaign. */
+export function readingsIn(problem: Problem | null): Reading[] {
+  const offered = (problem?.problems ?? []).filter(({ field }) => field === "reads_as").map(({ code }) => code);
+  return (Object.keys(READINGS) as Reading[]).filter((reading) => offered.includes(reading));
 }
 
 export const photoAddress = (trialId: number, photoId: number): string => `/api/trials/${trialId}/photos/${photoId}`;

@@ -203,7 +203,10 @@ def test_a_gap_makes_a_record_invalid_until_a_person_classifies_it_and_its_repai
     kept = (climb.time_s < 12.0) | (climb.time_s >= 12.5)
     columns = {"time_s": climb.time_s[kept], "altitude_m": climb["altitude_m"][kept]}
     trial = create_trial(client, campaign["id"])
-    invalid = upload(client, trial["id"], csv_of(columns)).json()
+    refused = upload(client, trial["id"], csv_of(columns))
+    assert (refused.status_code, set(problems_of(refused))) == (409, {"invalid"})
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
+    invalid = upload(client, trial["id"], csv_of(columns), invalid=True).json()
     assert (invalid["state"], [glitch["kind"] for glitch in invalid["glitches"]]) == ("invalid", ["gap"])
     assert (invalid["error"], "gap of 0.52 s after 11.980 s" in invalid["reason"]) == (None, True)
     assert invalid["repaired_error"] == pytest.approx(climb_error(1.0), abs=1e-3)

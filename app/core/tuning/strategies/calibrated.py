@@ -12,7 +12,7 @@ import numpy as np
 
 from app.core.definition import Flight, aborted_by_gains, was_flown
 from app.core.experiments.base import ModelledExperiment
-from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
+from app.core.formatting import count, format_gains, named_flights, percent, percent_of, plus_minus, short
 from app.core.policy import Box, PolicySpace, Vector
 from app.core.tuning.campaign_models import FITTED, CampaignModel, fit
 from app.core.tuning.evidence import Evidence
@@ -137,11 +137,11 @@ def _summary(
         )
     low, high = prediction.interval.lower, prediction.interval.upper
     assert base.error is not None
-    share = 1.0 - prediction.error / base.error
+    gained = base.error - prediction.error
+    amount = f"{percent_of(gained, base.error)} {'less' if gained >= 0.0 else 'more'} error than {best}".strip()
     return (
         f"{subject} predicts {short(prediction.error)} {unit} ({percent(prediction.interval.confidence)} interval "
-        f"{short(low)} … {short(high)} {unit}), {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than "
-        f"{best}."
+        f"{short(low)} … {short(high)} {unit}), {amount}."
     )
 
 

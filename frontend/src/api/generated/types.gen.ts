@@ -2804,7 +2804,8 @@ export type PresetInfo = {
  * ProblemField
  *
  * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
- * pass, by name, where any are known.
+ * pass, by name, where any are known. `code` is the reason, or the value of the field that would pass, for programs;
+ * empty where there is none.
  */
 export type ProblemField = {
     /**
@@ -2821,6 +2822,10 @@ export type ProblemField = {
     offer?: {
         [key: string]: number | number;
     };
+    /**
+     * Code
+     */
+    code?: string;
 };
 
 /**
@@ -2903,6 +2908,13 @@ export type Proposal = {
      */
     computed_at: string;
 };
+
+/**
+ * Reading
+ *
+ * How a record may be read that does not have seconds, metres, altitude positive up, and its zero at the ground.
+ */
+export type Reading = 'milliseconds' | 'microseconds' | 'centimetres' | 'millimetres' | 'feet' | 'down-positive' | 'other-datum';
 
 /**
  * RecordBrief
@@ -5810,9 +5822,15 @@ export type UploadTrajectoryData = {
         /**
          * Invalid
          *
-         * accept a record that cannot be scored, for instance because it ends too early
+         * accept a record that cannot be scored or is implausible, as an invalid flight
          */
         invalid?: boolean;
+        /**
+         * Reads As
+         *
+         * read the record in these units, with this sign, above this datum
+         */
+        reads_as?: Array<Reading>;
     };
     url: '/api/trials/{trial_id}/trajectory';
 };
@@ -6333,9 +6351,15 @@ export type ImportFlightData = {
         /**
          * Invalid
          *
-         * accept a record that cannot be scored, for instance because it ends too early
+         * accept a record that cannot be scored or is implausible, as an invalid flight
          */
         invalid?: boolean;
+        /**
+         * Reads As
+         *
+         * read the record in these units, with this sign, above this datum
+         */
+        reads_as?: Array<Reading>;
     };
     url: '/api/campaigns/{campaign_id}/records';
 };

@@ -2,7 +2,7 @@ import { Button, FileButton, Stack } from "@mantine/core";
 import { IconFileUpload } from "@tabler/icons-react";
 import type { RecordOrder, RecordUpload } from "../../../api/mutations";
 import { problemOf } from "../../../api/problems";
-import { confirmationIn, RECORD_FILES, recordOf, takeoffsIn } from "../../../api/records";
+import { confirmationIn, READINGS, RECORD_FILES, readingsIn, recordOf, takeoffsIn } from "../../../api/records";
 import type { NewTrial } from "../../../api/types";
 import { Note } from "../../../ui/Note";
 import { ErrorNotice } from "../../../ui/Notices";
@@ -20,6 +20,7 @@ const ACCEPT = { confirm: "Import with the gains in the log", invalid: "Store as
 export function ImportRecord({ upload, target }: Props) {
   const problem = problemOf(upload.error);
   const accepting = confirmationIn(problem);
+  const readings = readingsIn(problem);
   const again = (answer: Partial<RecordOrder>) =>
     upload.variables !== undefined && upload.mutate({ ...upload.variables, ...target, ...answer });
   return (
@@ -50,12 +51,21 @@ export function ImportRecord({ upload, target }: Props) {
           </Button>
         )}
       </FileButton>
-      <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid"]} />
+      <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid", "reads_as"]} />
       {takeoffsIn(problem).map(({ number, summary }) => (
         <Button key={number} variant="default" className={page["wrapping"]} onClick={() => again({ takeoff: number })}>
           Takeoff {number}: {summary}
         </Button>
       ))}
+      {readings.length > 0 && (
+        <Button
+          variant="default"
+          className={page["wrapping"]}
+          onClick={() => again({ reads_as: [...(upload.variables?.reads_as ?? []), ...readings] })}
+        >
+          Read it with {readings.map((reading) => READINGS[reading]).join(", ")}
+        </Button>
+      )}
       {accepting !== null && (
         <Button variant="default" onClick={() => again({ [accepting]: true })}>
           {ACCEPT[accepting]}
