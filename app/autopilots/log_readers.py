@@ -79,6 +79,14 @@ def _alone(read: Callable[[BinaryIO], Recording]) -> Callable[[BinaryIO, BinaryI
     return lambda stream, _companion: read(stream)
 
 
+_ARDUPILOT: Final = Reader(
+    title="ArduPilot's on-board log",
+    read=_alone(read_ardupilot),
+    flight=ardupilot_flight,
+    altitude="neither PSCD.PD nor CTUN.Alt, the altitude",
+    hint="Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN).",
+)
+
 READERS: Final[Mapping[Format, Reader]] = {
     Format.TLOG: Reader(
         title="MAVLink telemetry log",
@@ -87,13 +95,8 @@ READERS: Final[Mapping[Format, Reader]] = {
         altitude="no LOCAL_POSITION_NED of the vehicle",
         hint=TLOG_HINT,
     ),
-    Format.DATAFLASH: Reader(
-        title="ArduPilot's on-board log",
-        read=_alone(read_ardupilot),
-        flight=ardupilot_flight,
-        altitude="neither PSCD.PD nor CTUN.Alt, the altitude",
-        hint="Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN).",
-    ),
+    Format.DATAFLASH: _ARDUPILOT,
+    Format.DATAFLASH_TEXT: _ARDUPILOT,
     Format.ULOG: Reader(
         title="PX4's log",
         read=_alone(read_px4),

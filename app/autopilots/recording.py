@@ -33,7 +33,7 @@ Refused = Callable[[str, str], InputError]
 
 class EventKind(StrEnum):
     """What happened: the vehicle starting anew, its clock going on some time later; a command or mode that begins a
-    takeoff, another command or mode; leaving the ground, reaching it, the motors being switched off; a parameter
+    takeoff, another command or mode; leaving the ground, reaching it, the motors being switched on or off; a parameter
     becoming another, the end of what is recorded."""
 
     BOOT = "boot"
@@ -42,6 +42,7 @@ class EventKind(StrEnum):
     MODE = "mode"
     LIFT_OFF = "lift-off"
     LANDING = "landing"
+    MOTORS_ON = "motors on"
     MOTORS_OFF = "motors off"
     PARAMETER = "parameter"
     END = "end"
@@ -229,6 +230,12 @@ def refusal(happened: str, hint: str, notes: Sequence[str] = (), error: type[Inp
 def restarts(boots: int) -> list[str]:
     """The note on how often the vehicle started anew, if it did."""
     return [f"the vehicle restarted and reset its clock ({boots}×)"] if boots else []
+
+
+def left_out(skipped_bytes: int, odd_rows: int) -> list[str]:
+    """The note on what of a file was left out as damaged, if anything was."""
+    found = f"{skipped_bytes} bytes, and {odd_rows} rows with an impossible time"
+    return [f"damaged and left out: {found}"] if skipped_bytes or odd_rows else []
 
 
 def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:

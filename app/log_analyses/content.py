@@ -20,7 +20,8 @@ from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_analyses import manoeuvres, replicas, takeoffs
 from app.log_analyses.schemas import LogAnswer, Part, Refusal, ReplicaAnswer, TuningAnswer
-from app.logs.formats import HEAD_BYTES, NEVER_WRITTEN, Format, recognise
+from app.logs.base import HEAD_BYTES
+from app.logs.formats import NEVER_WRITTEN, Format, recognise
 
 ANALYSED: Final = (
     "ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or .tlog log "
@@ -29,7 +30,7 @@ ANALYSED: Final = (
 _OTHER_FILES: Final[Mapping[Format | None, str]] = {
     Format.GZIP: "is compressed (gzip): unpack it first",
     Format.ZIP: "is an archive (zip): unpack it first",
-    Format.DATAFLASH_TEXT: "is a .bin log converted to text: use the .bin itself",
+    Format.SDLOG2: "is a log of PX4 1.4 or older (.px4log), which is not supported",
     Format.ZEROS: NEVER_WRITTEN,
 }
 

@@ -12,6 +12,8 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 
 MAX_BYTES: Final = 512 * 2**20
+HEAD_BYTES: Final = 16 * 2**10
+"""So many bytes tell the format of a file: a log may begin with the end of another one."""
 
 Table = Mapping[str, NDArray[np.generic]]
 """Columns of one message type or topic, each of shape (n,)."""

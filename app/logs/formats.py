@@ -6,11 +6,12 @@ from enum import StrEnum
 from operator import methodcaller
 from typing import BinaryIO, Final
 
-from app.logs.dataflash import is_dataflash
+from app.logs.base import HEAD_BYTES
+from app.logs.dataflash import is_dataflash, is_sdlog2
+from app.logs.dataflash_text import is_dataflash_text
 from app.logs.tlog import is_tlog
 from app.logs.ulog import is_ulog
 
-HEAD_BYTES: Final = 4096
 NEVER_WRITTEN: Final = "has nothing but zeros where a log begins: it was never written, or not copied"
 _GROUND_LOG_LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
 
@@ -24,6 +25,7 @@ class Format(StrEnum):
     GROUND_LOG = ".data"
     GZIP = ".gz"
     ZIP = ".zip"
+    SDLOG2 = ".px4log"
     DATAFLASH_TEXT = ".log"
     ZEROS = "zeros"
 
@@ -42,15 +44,17 @@ def is_ground_log(head: bytes) -> bool:
 
 
 _KINDS: Final[tuple[tuple[Format, Callable[[bytes], bool]], ...]] = (
-    (Format.DATAFLASH, is_dataflash),
     (Format.ULOG, is_ulog),
     (Format.GROUND_LOG, is_ground_log),
     (Format.GZIP, methodcaller("startswith", b"\x1f\x8b")),
     (Format.ZIP, methodcaller("startswith", b"PK\x03\x04")),
-    (Format.DATAFLASH_TEXT, methodcaller("startswith", b"FMT, ")),
     (Format.ZEROS, lambda head: bool(head) and not any(head)),
+    (Format.SDLOG2, is_sdlog2),
     (Format.TLOG, is_tlog),
+    (Format.DATAFLASH, is_dataflash),
+    (Format.DATAFLASH_TEXT, is_dataflash_text),
 )
+"""First those with a mark at the beginning of the file; a log of ArduPilot's may begin with the end of another one."""
 
 
 def recognise(head: bytes) -> Format | None:

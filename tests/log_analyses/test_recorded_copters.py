@@ -15,7 +15,7 @@ from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
 from app.log_analyses.schemas import TuningAnswer
-from app.logs.formats import HEAD_BYTES
+from app.logs.base import HEAD_BYTES
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
 

@@ -24,6 +24,14 @@ def recorded(name: str) -> bytes:
     return path.read_bytes() if path.exists() else gzip.decompress((LOGS / f"{name}.gz").read_bytes())
 
 
+SIZES = {
+    letter: size
+    for size, letters in ((1, "bBM"), (2, "hHcCg"), (4, "iIeELfn"), (8, "qQd"), (16, "N"), (64, "Za"))
+    for letter in letters
+} | {"?": 0}
+"""Bytes of a column by its letter."""
+
+
 class OnBoardLog:
     """An on-board log put together by hand."""
 
@@ -33,8 +41,7 @@ class OnBoardLog:
         self.define(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns", length=89)
 
     def define(self, kind: int, name: str, letters: str, columns: str, *, length: int | None = None) -> None:
-        sizes = {"Q": 8, "f": 4, "B": 1, "n": 4, "N": 16, "Z": 64, "?": 0, "a": 64}
-        total = 3 + sum(sizes[letter] for letter in letters) if length is None else length
+        total = 3 + sum(SIZES[letter] for letter in letters) if length is None else length
         self.content += struct.pack(
             "<3sBB4s16s64s", b"\xa3\x95\x80", kind, total, name.encode(), letters.encode(), columns.encode()
         )

@@ -18,6 +18,8 @@ from app.core.records.trajectory import Samples
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.logs.recorded import recorded
 from tests.logs.written import (
+    ARMED,
+    DISARMED,
     GUIDED,
     LAND,
     LANDED,
@@ -107,10 +109,30 @@ def test_a_manual_mode_is_refused() -> None:
 
 
 def test_a_log_that_never_left_the_ground_is_refused() -> None:
-    assert refusal(ardupilot_log(gusty(), events=())) == (
-        "EV",
-        "has no takeoff, or nothing between takeoff and landing",
-    )
+    without_thrust = changed(throttle_filtered=0.0 * gusty().segments[0].throttle)
+    for log in (
+        ardupilot_log(gusty(), events=((0.0, ARMED),)),
+        ardupilot_log(standing(), events=()),
+        ardupilot_log(without_thrust, events=()),
+    ):
+        assert refusal(log) == ("EV", "has no takeoff, or nothing between takeoff and landing")
+
+
+@pytest.mark.parametrize(
+    ("events", "flown_s"),
+    [
+        ((), (10.0, 26.9)),
+        (((20.0, LANDED),), (10.0, 16.9)),
+        (((20.0, DISARMED),), (10.0, 16.9)),
+        (((15.0, NOT_LANDED),), (17.0, 26.9)),
+        (((15.0, ARMED), (17.0, NOT_LANDED)), (19.0, 26.9)),
+        (((15.0, LANDED), (16.0, NOT_LANDED)), (18.0, 26.9)),
+    ],
+)
+def test_a_log_that_begins_in_the_air_is_read_by_altitude_until_an_event_tells(
+    events: tuple[tuple[float, int], ...], flown_s: tuple[float, float]
+) -> None:
+    assert spans_s(read(ardupilot_log(gusty(), events=events)))[-1] == flown_s
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
@@ -171,6 +193,11 @@ def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_nam
     assert refusal(log.replace(b",DPD,TPD", b",XPD,YPD"))[0] == "PSCD.DPD"
 
 
+def standing() -> LoggedFlight:
+    """A vehicle on the ground with its motors turning, whose altitude drifts by decimetres."""
+    return changed(**{each: 0.05 * getattr(gusty().segments[0], each) for each in ("z_m", "z_d_m")})
+
+
 def moved(name: str, at_s: float, by: float, *, rows: int | None = None) -> LoggedFlight:
     """The flight with a signal moved from that time on, or for some rows."""
     (segment,) = gusty().segments
@@ -213,8 +240,50 @@ def test_after_a_restart_of_the_clock_the_flights_of_both_boots_count() -> None:
 
 
 def test_a_flight_before_a_restart_on_the_bench_counts() -> None:
-    flown, bench = ardupilot_log(gusty()), ardupilot_log(gusty(), events=())
-    assert spans_s(read(flown + bench)) == spans_s(read(flown))
+    flown = ardupilot_log(gusty())
+    for bench in (
+        ardupilot_log(gusty(), events=((0.0, ARMED),)),
+        ardupilot_log(standing(), events=()),
+        ardupilot_log(gusty(), modes=((0.0, STABILIZE),)),
+        ardupilot_log(gusty(), modes=(), events=()),
+    ):
+        assert spans_s(read(flown + bench)) == spans_s(read(flown))
+
+
+def test_a_boot_on_the_bench_with_a_later_clock_than_the_flight_s_is_not_in_the_air() -> None:
+    """Its log begins a while after it started, and the flight before it ended without a landing."""
+    flown = ardupilot_log(gusty())
+    assert spans_s(read(flown + ardupilot_log(standing(), begin_s=300.0, events=()))) == spans_s(read(flown))
+    assert spans_s(read(flown + ardupilot_log(gusty(), begin_s=300.0, events=((290.0, ARMED),)))) == spans_s(
+        read(flown)
+    )
+
+
+def test_a_restart_in_the_air_is_flown_on_from() -> None:
+    found = spans_s(read(ardupilot_log(gusty()) + ardupilot_log(gusty(), events=())))
+    assert [round(end_s - begin_s, 1) for begin_s, end_s in found] == [16.9, 16.8]
+
+
+def test_a_failsafe_ends_with_a_restart() -> None:
+    vibrating = ardupilot_log(gusty(), errors=((12.0, VIBRATION_FAILSAFE, 1),))
+    assert len(spans_s(read(vibrating + ardupilot_log(gusty())))) == 1
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
+def test_a_ring_whose_first_half_is_newer_is_read_as_the_flight(share: float) -> None:
+    whole = ardupilot_log(gusty())
+    cut = round(share * len(whole))
+    (whole_s,), found = spans_s(read(whole)), spans_s(read(whole[cut:] + whole[:cut]))
+    assert (found[0][0], found[-1][1]) == whole_s
+
+
+def test_what_was_damaged_is_said() -> None:
+    whole = ardupilot_log(gusty())
+    assert read_ardupilot(io.BytesIO(whole)).notes == []
+    damaged = whole[:8000] + bytes(300) + whole[8200:]
+    assert read_ardupilot(io.BytesIO(damaged)).notes == [
+        "damaged and left out: 357 bytes, and 0 rows with an impossible time"
+    ]
 
 
 def test_a_row_with_a_damaged_time_is_left_out() -> None:

@@ -18,7 +18,8 @@ from app.autopilots.tlog import read_tlog
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
-from app.logs.formats import HEAD_BYTES, Format, recognise
+from app.logs.base import HEAD_BYTES
+from app.logs.formats import Format, recognise
 from tests.logs.recorded import BEGAN_US, Telemetry, recorded
 from tests.logs.written_tlog import LOITER, frames_of, together
 from tests.logs.written_tlog import Recording as Steps

@@ -9,7 +9,7 @@ from tests.logs.recorded import OnBoardLog
 
 PARM, MODE, EV, PSCD, CTUN, ATT, ERR = 1, 2, 3, 4, 5, 6, 7
 GUIDED, LOITER, LAND, STABILIZE = 4, 5, 9, 0
-NOT_LANDED, LANDED = 28, 18
+NOT_LANDED, LANDED, ARMED, DISARMED = 28, 18, 10, 11
 VIBRATION_FAILSAFE = 29
 
 PARAMETERS: Mapping[str, float] = {

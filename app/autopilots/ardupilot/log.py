@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import BinaryIO, Final
@@ -12,6 +13,7 @@ from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.recording import (
     COMMANDS,
+    Column,
     Event,
     EventKind,
     ParameterHistory,
@@ -19,9 +21,11 @@ from app.autopilots.recording import (
     Setting,
     Source,
     columns_of,
+    left_out,
     restarts,
 )
-from app.logs.base import Table, contents, numbers, rows_of
+from app.logs.base import Table, contents, numbers, refused, rows_of
+from app.logs.boots import CLOCK
 from app.logs.dataflash import parameters_in, read_tables
 
 LOOP: Final[Mapping[str, Source]] = {
@@ -63,6 +67,7 @@ _WANTED: Final = frozenset(
 _ACCEPTED: Final = (0, 5)
 _EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
     {
+        10: (EventKind.MOTORS_ON, "motors on"),
         11: (EventKind.MOTORS_OFF, "motors off"),
         18: (EventKind.LANDING, "the landing"),
         28: (EventKind.LIFT_OFF, "lift-off"),
@@ -71,25 +76,34 @@ _EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
 MODES: Final[Mapping[float, str]] = MappingProxyType(
     {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
 )
+_MODES_AS_TEXT: Final = {name.replace("_", "").encode(): number for number, name in {**MODES, 7: "CIRCLE"}.items()}
+_UNTIL_RESTART: Final = ("mode", "vibration_failsafe")
+"""States that a vehicle that starts anew reports only as they change."""
+_NO_CLOCK_HINT: Final = "Releases of ArduCopter before 3.1 log no time: use a log of a newer one."
 _OTHER_FIRMWARE: Final = re.compile(rb"(ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V\d")
 
 
 def read_ardupilot(stream: BinaryIO) -> Recording:
-    """Decode a whole log."""
+    """Decode a whole log, binary or as text. Raises TrajectoryError if no message in it has the time."""
     log = read_tables(contents(stream), _WANTED)
+    if log.tables and not any(CLOCK in table for table in log.tables.values()):
+        raise refused("has no message with the time (TimeUS or TimeMS)", _NO_CLOCK_HINT)
     tables = log.tables | {name: _only(log.tables[name], *which) for name, which in _ROWS.items() if name in log.tables}
-    has_loop = {"TimeUS", "PD"} <= tables.get("PSCD", {}).keys()
-    columns = columns_of(tables, {**LOOP, **_BESIDE, **({} if has_loop else _WITHOUT_LOOP)}, clock="TimeUS")
+    tables["MODE"] = _with_numbers(tables.get("MODE", {}))
+    has_loop = {CLOCK, "PD"} <= tables.get("PSCD", {}).keys()
+    sources = {**LOOP, **_BESIDE, **({} if has_loop else _WITHOUT_LOOP)}
+    columns = columns_of(tables, {name: _in_si(each, log.factors) for name, each in sources.items()}, clock=CLOCK)
+    columns |= {name: _until_restart(columns[name], log.boots_s) for name in _UNTIL_RESTART if name in columns}
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
     return Recording(
         title=f"ArduPilot's on-board log, altitude from {altitude}",
         autopilot=ARDUPILOT,
         firmware=_other_firmware(tables),
         columns=columns,
-        sources=list(tables),
+        sources=list(log.tables),
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
         events=sorted(_events(tables, log.boots_s), key=lambda event: event.time_s),
-        notes=restarts(len(log.boots_s)),
+        notes=[*restarts(len(log.boots_s)), *left_out(log.skipped_bytes, log.odd_rows)],
     )
 
 
@@ -102,17 +116,38 @@ def history(recording: Recording, names: frozenset[str]) -> ParameterHistory:
 def _events(tables: Mapping[str, Table], boots_s: Sequence[float]) -> Iterator[Event]:
     """Takeoff commands, events that end the flight, and landings."""
     yield from (Event(EventKind.BOOT, boot_s, "the vehicle restarting") for boot_s in boots_s)
-    for time_s, command, result in rows_of(tables.get("MAVC", {}), "TimeUS", "Cmd", "Res"):
+    for time_s, command, result in rows_of(tables.get("MAVC", {}), CLOCK, "Cmd", "Res"):
         if result in _ACCEPTED and command in COMMANDS:
             kind, what = COMMANDS[command]
             yield Event(kind, time_s, what)
-    modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
+    modes = list(rows_of(tables.get("MODE", {}), CLOCK, "ModeNum"))
     for (_, before), (time_s, mode) in pairwise(modes):
-        if mode != before:
+        if mode != before and np.isfinite(mode):
             yield Event(EventKind.MODE, time_s, f"the mode {MODES.get(mode, f'{mode:g}')}")
-    for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id"):
+    for time_s, event in rows_of(tables.get("EV", {}), CLOCK, "Id"):
         if event in _EVENTS:
             yield Event(_EVENTS[event][0], time_s, _EVENTS[event][1])
+
+
+def _in_si(source: Source, factors: Mapping[str, Mapping[str, float]]) -> Source:
+    """The source of values in SI, of which the log tells the factor, or which have it already."""
+    return replace(source, factor=source.factor * factors.get(source.message, {}).get(source.field, 1.0))
+
+
+def _until_restart(column: Column, boots_s: Sequence[float]) -> Column:
+    """A state that nothing is known of after a restart, until it is reported again."""
+    rows = np.searchsorted(column.time_s, boots_s)
+    time_s, values = np.insert(column.time_s, rows, boots_s), np.insert(column.values, rows, np.nan)
+    return replace(column, time_s=time_s, values=values)
+
+
+def _with_numbers(modes: Table) -> Table:
+    """Modes by number, which old releases log as the mode itself, and logs as text by its name."""
+    if "ModeNum" in modes or "Mode" not in modes:
+        return modes
+    texts = [each.upper().replace(b"_", b"") for each in modes["Mode"].astype("S16").tolist()]
+    found = [float(each) if each.isdigit() else _MODES_AS_TEXT.get(each, np.nan) for each in texts]
+    return {**modes, "ModeNum": np.array(found)}
 
 
 def _only(table: Table, columns: Collection[str], value: int) -> Table:

@@ -37,6 +37,9 @@ _HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
 """ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
+_ABOVE_GROUND_M: Final = 1.0
+_TELLING: Final = (EventKind.BOOT, EventKind.MOTORS_ON, EventKind.LIFT_OFF, EventKind.LANDING, EventKind.MOTORS_OFF)
+"""Events after which it is known whether the vehicle is in the air, or not any more."""
 _JUMP_M: Final = 0.1
 _JUMP_M_S: Final = 1.0
 _LARGEST_ACCELERATION_M_S2: Final = 50.0
@@ -147,13 +150,21 @@ def _is_reset(rows: Segment) -> Rows:
 
 
 def _in_flight(recording: Recording, time_s: Samples) -> Rows:
-    """Rows between takeoff and landing, by the vehicle's own events."""
-    flying = np.zeros(len(time_s), dtype=np.bool_)
-    for event in recording.events_of(EventKind.LIFT_OFF, EventKind.LANDING, EventKind.BOOT):
+    """Rows between takeoff and landing, by the vehicle's own events. Where none tells whether it flew, as in a log that
+    begins in the air, those well above the lowest altitude, which is 0 or less, and with thrust."""
+    altitude_m, thrust = recording.columns["altitude_m"].values, recording.at("thrust", time_s)
+    lowest_m = np.min(altitude_m[np.isfinite(altitude_m)], initial=0.0)
+    is_up = (altitude_m > lowest_m + _ABOVE_GROUND_M) & (thrust > 0.0)
+    flying, unknown_from_s = is_up, -np.inf
+    for event in recording.events_of(*_TELLING):
+        if event.kind in (EventKind.MOTORS_ON, EventKind.LIFT_OFF):
+            flying = flying & (time_s < unknown_from_s)
         if event.kind is EventKind.LIFT_OFF:
-            flying |= time_s >= event.time_s + _AFTER_TAKEOFF_S
+            flying = flying | (time_s >= event.time_s + _AFTER_TAKEOFF_S)
         else:
-            flying &= time_s < event.time_s - _BEFORE_LANDING_S
+            flying = flying & (time_s < event.time_s - _BEFORE_LANDING_S)
+        unknown_from_s = event.time_s if event.kind is EventKind.BOOT else np.inf
+        flying = flying | (is_up & (time_s >= unknown_from_s))
     return flying
 
 
