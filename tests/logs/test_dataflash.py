@@ -264,7 +264,7 @@ def test_nothing_else_is_taken_for_a_log() -> None:
     assert recognise(told.content) is Format.TLOG
     assert recognise(told.content[1:]) is Format.TLOG
     assert recognise(random.Random(1).randbytes(HEAD_BYTES)) is None
-    assert recognise(bytes(HEAD_BYTES)) is None
+    assert recognise(bytes(HEAD_BYTES)) is Format.ZEROS
     assert recognise(b"time_s,altitude_m\n0,0\n") is None
 
 
