@@ -52,7 +52,14 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         <span>{count(campaign.trials.flown, "flight")}</span>
         <details className={classes["settings"]}>
           <summary>Settings</summary>
-          <SimpleGrid component="dl" minColWidth={200} spacing={20} verticalSpacing={10} className={panel["panel"]}>
+          <SimpleGrid
+            component="dl"
+            c="var(--ink)"
+            minColWidth={200}
+            spacing={20}
+            verticalSpacing={10}
+            className={panel["panel"]}
+          >
             {settingsOf(campaign, catalogue).map(([title, value]) => (
               <LabelledValue key={title} title={title} value={value} />
             ))}
