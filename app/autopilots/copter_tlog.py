@@ -19,25 +19,21 @@ from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.autopilots.recording import (
-    LONGEST_INTERVAL_S,
     ParameterHistory,
     Parameters,
     Recording,
-    Refused,
     Rows,
     held,
-    refusal,
 )
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, jumps
+from app.autopilots.segments import LARGEST_LEAN, Condition, Refused, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, FlownSteps
 from app.core.analysis.segment import LEAD_S
-from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
+from app.core.reasons import OTHER_FRAMES, Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples, Trajectory
 
-_READ_LATE: Final = "was changed after the flight, and was not read before"
 _STEPS_APART_S: Final = 1.0
 _SETTLED_S: Final = 6.5
 """Hover after the last step that is analysed."""
@@ -72,7 +68,7 @@ class _Autopilot:
 
     def mode_name(self, mode: int) -> str:
         """As its users call it."""
-        return self.modes.get(mode, f"mode {mode}")
+        return self.modes.get(mode, f"mode-{mode}")
 
 
 _ASK: Final = (
@@ -145,16 +141,12 @@ class _Reader:
     autopilot: _Autopilot
 
     def read(self) -> LoggedFlight:
-        if frame := self.recording.frame:
-            raise self._refused("file", f"is the log of {frame}, not of a copter with several rotors")
-        if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
-            raise TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
+        if self.recording.frame in OTHER_FRAMES:
+            raise self._refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[self.recording.frame]))
+        if reasons := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
+            raise refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, reasons)
         rows = self._rows()
         time_s, target_m = rows.time_s, rows["set_point_m"]
-        none_found = (
-            f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
-            "in one of the messages, a jump in altitude or a parameter change"
-        )
         given, parts = choose_parts(
             time_s,
             self._conditions(rows),
@@ -162,9 +154,8 @@ class _Reader:
             ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
             np.diff(target_m, prepend=target_m[0]) / np.diff(time_s, prepend=time_s[0] - 1.0),
             self._refused,
-            ("LOCAL_POSITION_NED", none_found),
             self.autopilot.bounds,
-            lambda _: _READ_LATE,
+            lambda gain: Reason(code=ReasonCode.PARAMETER_READ_LATE, field=gain),
         )
         part = max((slice(*each) for each in parts), key=lambda each: float(np.ptp(target_m[each])))
         begin_s = float(time_s[part.start])
@@ -208,10 +199,12 @@ class _Reader:
         rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
         field = "POSITION_TARGET_LOCAL_NED"
         if not rows:
-            raise self._refused(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
+            numbers, named = {"rest_s": LEAD_S}, [self._mode]
+            raise self._refused(Reason(code=ReasonCode.NO_STEPS, field=field, numbers=numbers, named=named))
         times_s = time_s[rows]
         if np.any(np.diff(times_s) < _STEPS_APART_S):
-            raise self._refused(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
+            numbers = {"apart_s": _STEPS_APART_S}
+            raise self._refused(Reason(code=ReasonCode.STEPS_TOO_CLOSE, field=field, numbers=numbers))
         end_s = time_s[found[len(rows)]] if len(found) > len(rows) else time_s[-1]
         return FlownSteps(
             set_points=SetPoints(
@@ -226,10 +219,10 @@ class _Reader:
         time_s, lean = rows.time_s, self.recording.columns["lean"].beside(rows.time_s)
         is_known = np.isfinite(np.sum([*rows.channels.values(), lean], axis=0))
         return (
-            (_follows(self.recording, self.autopilot, time_s), "HEARTBEAT", f"has no flight in {self._mode}"),
-            (is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
-            (self._is_off_ground(rows), "LOCAL_POSITION_NED", f"never is {_OFF_GROUND_M:g} m above the ground"),
-            (lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
+            Condition(self._is_off_ground(rows), ReasonCode.NEVER_FLEW, "LOCAL_POSITION_NED"),
+            Condition(_follows(self.recording, self.autopilot, time_s), ReasonCode.ALTITUDE_NOT_HELD, "HEARTBEAT"),
+            Condition(is_known, ReasonCode.GAPS, "LOCAL_POSITION_NED"),
+            Condition(lean >= LARGEST_LEAN, ReasonCode.LEANS, "ATTITUDE_TARGET"),
         )
 
     def _is_off_ground(self, rows: Trajectory) -> Rows:
@@ -239,16 +232,16 @@ class _Reader:
         above_m = rows["altitude_m"] - rows["altitude_m"][rested]
         return np.asarray((rested < 0) | (above_m > _OFF_GROUND_M))
 
-    def _sparse_messages(self) -> Iterator[Problem]:
+    def _sparse_messages(self) -> Iterator[Reason]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
         for message in self.autopilot.messages:
             found = [each.time_s for name, each in self.recording.columns.items() if SOURCES[name].message == message]
             rate_hz = self._rate_hz(found[0]) if found else 0.0
             if not found:
-                yield Problem(message, "is missing")
+                yield Reason(code=ReasonCode.MESSAGE_MISSING, field=message)
             elif rate_hz * LARGEST_INTERVAL_S < 1.0:
-                rate = f"{rate_hz:.1f} times" if rate_hz else "less than once"
-                yield Problem(message, f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed")
+                numbers = {"rate_hz": rate_hz, "needed_hz": 1.0 / LARGEST_INTERVAL_S}
+                yield Reason(code=ReasonCode.MESSAGE_RARE, field=message, numbers=numbers)
 
     def _rate_hz(self, at_s: Samples) -> float:
         following = _follows(self.recording, self.autopilot, at_s)
@@ -256,25 +249,21 @@ class _Reader:
         counted = intervals_s[intervals_s <= _INTERRUPTED_S]
         return 1.0 / float(counted.mean()) if counted.size else 0.0
 
-    def _missing_mode(self) -> Iterator[Problem]:
+    def _missing_mode(self) -> Iterator[Reason]:
         armed, mode = self.recording.columns["is_armed"], self.recording.columns["mode"]
         flown = [self.autopilot.number_of_mode(int(each)) for each in mode.values[armed.values > 0.0].tolist()]
         if not flown:
-            yield Problem("HEARTBEAT", "never reports armed motors")
+            yield Reason(code=ReasonCode.NEVER_ARMED, field="HEARTBEAT")
         elif self.autopilot.mode not in flown:
-            modes = ", ".join(self.autopilot.mode_name(each) for each in dict.fromkeys(flown))
-            yield Problem(
-                "HEARTBEAT",
-                f"has no flight in {self._mode}, only in {modes}, where the messages do not determine the reference",
-            )
+            modes = [self.autopilot.mode_name(each) for each in dict.fromkeys(flown)]
+            yield Reason(code=ReasonCode.OTHER_MODES, field="HEARTBEAT", named=[self._mode, *modes])
 
-    def _missing_parameters(self) -> Iterator[Problem]:
+    def _missing_parameters(self) -> Iterator[Reason]:
         known = {name for _, name, _ in self._settings()}
         for each in (*self.autopilot.bounds, self.autopilot.learned):
             if each and each not in known:
-                newer = next(iter(in_newer_names({each: 0.0})))
-                renamed = f", nor {newer} of release 4.7" if newer != each else ""
-                yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
+                newer = [name for name in in_newer_names({each: 0.0}) if name != each]
+                yield Reason(code=ReasonCode.PARAMETER_MISSING, field=each, named=newer)
 
     def _settings(self) -> Iterator[tuple[float, str, float]]:
         """Parameters by their older names, in order of time; values that nobody had written before hold from −∞ on."""
@@ -306,7 +295,7 @@ class _Reader:
 
     @property
     def _refused(self) -> Refused:
-        return refusal(f"{self.name} cannot be analysed.", self.autopilot.hint)
+        return lambda reason: refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, [reason])
 
 
 def _follows(recording: Recording, autopilot: _Autopilot, time_s: Samples) -> Rows:

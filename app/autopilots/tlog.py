@@ -80,7 +80,7 @@ _LOCAL_POSITION_NED: Final = 32
 _COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
 """Kinds of vehicles with several rotors, in a heartbeat."""
 _OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
-    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
+    {1: "plane", 4: "helicopter", 10: "rover", 11: "boat", 12: "submarine"}
 )
 
 

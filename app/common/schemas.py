@@ -5,6 +5,7 @@ like another.
 """
 
 import unicodedata
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Annotated, Final, Generic, Self, TypeVar
 
@@ -88,11 +89,14 @@ class Request(Schema):
 
 class ProblemField(Schema):
     """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
-    pass, by name, where any are known."""
+    pass, by name, where any are known. Of a log, `code`, `numbers` and `named` say the same as data."""
 
     field: str
     reason: str
     offer: Gains = {}
+    code: str = ""
+    numbers: Mapping[str, float] = {}
+    named: Sequence[str] = ()
 
 
 class Problem(Schema):

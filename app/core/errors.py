@@ -7,7 +7,7 @@ GainlineError
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 
@@ -16,12 +16,16 @@ class Problem:
     """One refused field.
 
     `field` is its name as the caller wrote it (dotted, `gains.kp`), `reason` why it was refused; `offer` holds gains
-    that would pass, by name, if any are known.
+    that would pass, by name, if any are known. `code`, `numbers`, by names that end in their unit, and `named` say the
+    reason as data, where it has a code (`app.core.reasons`).
     """
 
     field: str
     reason: str
     offer: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    code: str = ""
+    numbers: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    named: Sequence[str] = ()
 
 
 class GainlineError(Exception):

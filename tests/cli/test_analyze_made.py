@@ -29,7 +29,7 @@ copter = cache(simulated_flight)
 px4 = cache(simulated_px4)
 TLOG: Final = Recording()
 FIXED_WING: Final = 1
-NEVER_ASKED: Final = "is not in the log, nor PSC_D_POS_P of release 4.7: read the vehicle's parameters"
+NEVER_ASKED: Final = "is not in the log, nor is PSC_D_POS_P: read the vehicle's parameters"
 
 
 def cut(content: bytes, share: float = 0.6) -> bytes:
@@ -54,16 +54,14 @@ class RefusedLog:
 REFUSED: Final = (
     RefusedLog("packed.bin", lambda: b"\x1f\x8b\x08", "file: is compressed (gzip): unpack it first"),
     RefusedLog("definitions.bin", lambda: cut(ardupilot_log(copter()), 0.01), "file: has no data: copy the whole log"),
-    RefusedLog("plane.bin", of_a_plane, "MSG: is of ArduPlane, not of ArduCopter"),
+    RefusedLog("plane.bin", of_a_plane, "file: is that of a plane, not of a copter with several rotors"),
     RefusedLog("header.ulg", lambda: px4_log(px4())[:16], "file: has no data: copy the whole log"),
     RefusedLog(
         "plane.ulg",
         lambda: px4_log(px4(), without=("takeoff_status",), kind=2),
-        "vehicle_status.vehicle_type: is never that of a copter",
+        "file: is that of a plane",
     ),
-    RefusedLog(
-        "plane.tlog", lambda: replace(TLOG, kind=FIXED_WING).content, "file: is the log of a fixed-wing aircraft"
-    ),
+    RefusedLog("plane.tlog", lambda: replace(TLOG, kind=FIXED_WING).content, "file: is that of a plane"),
     RefusedLog(
         "hover.tlog",
         lambda: replace(TLOG, set_points=((0.0, 5.0),)).content,
@@ -72,11 +70,9 @@ REFUSED: Final = (
     RefusedLog(
         "loiter.tlog",
         lambda: replace(TLOG, mode=LOITER).content,
-        "HEARTBEAT: has no flight in GUIDED, only in LOITER, where the messages do not determine the reference",
+        "HEARTBEAT: has no flight in the one mode whose set points the messages give: needed and flown, GUIDED, LOITER",
     ),
-    RefusedLog(
-        "hold.tlog", lambda: replace(PX4_RECORDING, mode=HOLD).content, "no flight in Offboard, only in Automatic"
-    ),
+    RefusedLog("hold.tlog", lambda: replace(PX4_RECORDING, mode=HOLD).content, "needed and flown, Offboard, Automatic"),
     RefusedLog("unread.tlog", lambda: replace(TLOG, parameters={}).content, f"PSC_POSZ_P: {NEVER_ASKED}"),
     RefusedLog(
         "slow.tlog",
@@ -86,7 +82,7 @@ REFUSED: Final = (
     RefusedLog(
         "sideways.tlog",
         lambda: replace(TLOG, lean_rad=0.7).content,
-        "ATTITUDE_TARGET: leans by more than 30° throughout the flight",
+        "ATTITUDE_TARGET: leans by more than 30° in too much of the flight",
     ),
 )
 

@@ -32,6 +32,7 @@ def refusal(flight: LoggedFlight) -> str:
     with pytest.raises(TrajectoryError) as refused:
         analyze(flight)
     (problem,) = refused.value.problems
+    assert problem.code
     assert "Fly at a height of 3 m or more" in refused.value.hint
     return problem.reason
 
@@ -44,7 +45,7 @@ def found() -> Analysis:
 
 def test_the_log_of_the_real_binary_gives_gains_six_times_better(found: Analysis) -> None:
     """SITL flew 4.2 mm with its own proposal from such a flight, and 27 mm with the defaults."""
-    assert found.insufficient is None
+    assert found.why_none is None
     assert found.proposed is not None
     present = found.assessments[0]
     assert present.name == "As flown"
@@ -68,9 +69,10 @@ def test_the_documented_rule_follows_the_hover_throttle() -> None:
 def test_too_much_gust_for_the_slope_says_what_to_fly() -> None:
     found = analyze(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3))
     assert found.proposed is None
-    assert found.insufficient is not None
-    assert "is not sufficient" in found.insufficient
-    assert "climb 2 m" in found.insufficient
+    assert found.why_none is not None
+    assert found.why_none.code == "slope_unknown"
+    assert found.why_none.numbers["thrust_slope_deviation"] > 0.15
+    assert "climb 2 m" in found.answer
 
 
 def test_the_end_of_a_climb_with_a_hover_is_described_and_answers_nothing() -> None:
@@ -78,8 +80,8 @@ def test_the_end_of_a_climb_with_a_hover_is_described_and_answers_nothing() -> N
     The climb begins after 4 s, and the first 2 s are not scored."""
     found = analyze(shortened(simulated_flight(), slice(35, 105)))
     assert found.proposed is None
-    assert found.insufficient is not None
-    assert "no altitude change both begins and ends in it" in found.insufficient
+    assert found.why_none is not None
+    assert found.why_none.code == "no_whole_change"
     assert found.estimate.mean.hover_throttle == pytest.approx(QUIET.hover_throttle, abs=0.002)
 
 
@@ -109,8 +111,8 @@ def test_a_vehicle_that_no_gains_suit_is_told() -> None:
     strong = replace(QUIET, hover_throttle=0.05, assumed_hover_throttle=0.125)
     found = analyze(simulated_flight(strong, acceleration_p=0.05, acceleration_i_1_s=0.1))
     assert found.proposed is None
-    assert found.insufficient is not None
-    assert "No gains within the documented ranges" in found.insufficient
+    assert found.why_none is not None
+    assert found.why_none.code == "margin_unreachable"
 
 
 def test_hover_alone_is_refused() -> None:
@@ -124,7 +126,7 @@ def test_hover_alone_is_refused() -> None:
 
 def test_too_short_a_flight_is_refused() -> None:
     assert refusal(shortened(simulated_flight(), slice(30, 80))) == (
-        "holds altitude for 4.9 s only; 6 s are needed; the vehicle hovers at a throttle of 0.40"
+        "holds altitude for too short a time: 6 s are needed"
     )
 
 

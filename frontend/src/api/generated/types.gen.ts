@@ -2804,7 +2804,7 @@ export type PresetInfo = {
  * ProblemField
  *
  * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
- * pass, by name, where any are known.
+ * pass, by name, where any are known. Of a log, `code`, `numbers` and `named` say the same as data.
  */
 export type ProblemField = {
     /**
@@ -2821,6 +2821,20 @@ export type ProblemField = {
     offer?: {
         [key: string]: number | number;
     };
+    /**
+     * Code
+     */
+    code?: string;
+    /**
+     * Numbers
+     */
+    numbers?: {
+        [key: string]: number;
+    };
+    /**
+     * Named
+     */
+    named?: Array<string>;
 };
 
 /**
