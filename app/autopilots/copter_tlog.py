@@ -11,10 +11,12 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.ardupilot import logged_flight as ardupilot_flight
 from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop, read_ardupilot
 from app.autopilots.ardupilot.log import MODES
 from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
+from app.autopilots.px4 import logged_flight as px4_flight
 from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
@@ -50,12 +52,13 @@ _AT_REST_M: Final = 0.05
 class _Autopilot:
     """What differs between ArduCopter and PX4.
 
-    `number_of_mode` is of the custom mode in a heartbeat; `mode` is the one whose set points the vehicle reports.
-    `messages` are needed. Of the parameters, the gains in `bounds` are needed, and `learned` if there is one, which the
-    vehicle changes by itself; `kept` are all on which the loop depends.
-    `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
+    `frame_of` names a vehicle that is no copter. `number_of_mode` is of the custom mode in a heartbeat; `mode` is the
+    one whose set points the vehicle reports. `messages` are needed. Of the parameters, the gains in `bounds` are
+    needed, and `learned` if there is one, which the vehicle changes by itself; `kept` are all on which the loop
+    depends. `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
     """
 
+    frame_of: Callable[[Recording], str]
     number_of_mode: Callable[[int], int]
     mode: int
     modes: Mapping[float, str]
@@ -88,6 +91,7 @@ _MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, HOVER_RA
 _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
     {
         "ardupilot": _Autopilot(
+            frame_of=ardupilot_flight.frame_of,
             number_of_mode=lambda mode: mode,
             mode=4,
             modes=MODES,
@@ -104,6 +108,7 @@ _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
             ),
         ),
         "px4": _Autopilot(
+            frame_of=px4_flight.frame_of,
             number_of_mode=lambda mode: mode >> 16 & 0xFF,
             mode=6,
             modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
@@ -141,8 +146,11 @@ class _Reader:
     autopilot: _Autopilot
 
     def read(self) -> LoggedFlight:
-        if self.recording.frame in OTHER_FRAMES:
-            raise self._refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[self.recording.frame]))
+        frame = (
+            self.recording.frame if self.recording.frame in OTHER_FRAMES else self.autopilot.frame_of(self.recording)
+        )
+        if frame:
+            raise self._refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
         if reasons := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
             raise refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, reasons)
         rows = self._rows()
@@ -185,7 +193,7 @@ class _Reader:
 
     def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
         if self.autopilot.shapes_reference:
-            loop = replace(ardupilot_loop(given), has_newer_names=self._has_newer_names)
+            loop = replace(ardupilot_loop(given), has_newer_names=ardupilot_flight.has_newer_names(self.recording))
             return read_ardupilot(loop, trajectory, self._steps(trajectory))
         hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
         whole = FlownSteps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
@@ -283,11 +291,11 @@ class _Reader:
         """By the names of the vehicle's release."""
         known = {*given, self.autopilot.learned, *_IN_TAKEOFFS, *_MAY_LACK}
         absent = [each for each in self.autopilot.kept if each not in known]
-        return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
-
-    @property
-    def _has_newer_names(self) -> bool:
-        return any(each.name in ardupilot.NEWER_NAMES for each in self.recording.settings)
+        return (
+            tuple(in_newer_names(dict.fromkeys(absent, 0.0)))
+            if ardupilot_flight.has_newer_names(self.recording)
+            else tuple(absent)
+        )
 
     @property
     def _mode(self) -> str:

@@ -1,6 +1,5 @@
 """Parts of a logged flight that can be analysed: rows that follow each other without a gap, a jump or a change."""
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Rows
 from app.core.errors import TrajectoryError
-from app.core.reasons import Reason, ReasonCode
+from app.core.reasons import LEFT_OUT, Reason, ReasonCode
 from app.core.records.trajectory import Samples
 
 SHORTEST_PART_S: Final = 4.0
@@ -93,50 +92,37 @@ def _find_parts(
     `time_s`, shape (n,), increases, and `cuts_s` does too. What leaves out a row is the first condition that it does
     not meet; a part that is too short, what ends it, or else what begins it.
     """
-    seconds = np.minimum(np.diff(time_s, append=time_s[-1:]), LONGEST_INTERVAL_S)
-    cause = np.full(len(time_s), len(conditions))
-    for place in reversed(range(len(conditions))):
-        cause[~conditions[place].rows] = place
     codes = [each.code for each in conditions]
-    left_out_s: defaultdict[ReasonCode, float] = defaultdict(float)
-    for place, code in enumerate(codes):
-        left_out_s[code] += float(seconds[cause == place].sum())
-    rows = np.flatnonzero(cause == len(conditions))
-    after, cut = rows[1:], np.searchsorted(cuts_s, time_s[rows], side="right")
-    ends = {
-        ReasonCode.GAPS: np.diff(time_s[rows]) > LONGEST_INTERVAL_S,
-        ReasonCode.RESETS: begins[after],
-        ReasonCode.PARAMETER_CHANGES: np.diff(cut) > 0,
-    }
-    apart = np.diff(rows) > 1
-    separated = np.flatnonzero(np.logical_or.reduce([apart, *ends.values()]))
-
-    def separator(place: int) -> ReasonCode:
-        """What is between two usable rows."""
-        excluded = codes[int(cause[rows[place] + 1])] if apart[place] else None
-        return excluded or next(code for code, found in ends.items() if found[place])
-
-    between = [ReasonCode.NEVER_FLEW, *map(separator, separated.tolist()), ReasonCode.NEVER_FLEW]
+    codes += [ReasonCode.GAPS, ReasonCode.RESETS, ReasonCode.PARAMETER_CHANGES, ReasonCode.TOO_SHORT]
+    gap, reset, change, too_short = range(len(conditions), len(codes))
+    seconds = np.minimum(np.diff(time_s, append=time_s[-1:]), LONGEST_INTERVAL_S)
+    passed = np.array([each.rows for each in conditions])
+    cause = np.where(passed.all(axis=0), too_short, passed.argmin(axis=0))
+    lost_s = np.bincount(cause, seconds, minlength=len(codes))
+    lost_s[too_short] = 0.0
+    rows = np.flatnonzero(cause == too_short)
+    cut = np.searchsorted(cuts_s, time_s[rows], side="right")
+    ends = (np.diff(rows) > 1, np.diff(time_s[rows]) > LONGEST_INTERVAL_S, begins[rows[1:]], np.diff(cut) > 0)
+    separators = np.select(ends, (cause[rows[:-1] + 1], gap, reset, change), default=too_short)
+    separated = np.flatnonzero(separators != too_short)
+    between = [0, *separators[separated].tolist(), 0]
     found = []
     for place, part in enumerate(np.split(rows, separated + 1) if rows.size else ()):
         if time_s[part[-1]] - time_s[part[0]] >= SHORTEST_PART_S:
             found.append((int(part[0]), int(part[-1]) + 1))
         else:
-            causes = (each for each in reversed(between[place : place + 2]) if each is not ReasonCode.NEVER_FLEW)
-            left_out_s[next(causes, ReasonCode.TOO_SHORT)] += float(seconds[part].sum())
-    flown_s = float(seconds[cause > 0].sum())
-    del left_out_s[ReasonCode.NEVER_FLEW]
+            lost_s[between[place + 1] or between[place] or too_short] += seconds[part].sum()
     held = np.all([each.rows for each in conditions if each.code in _HELD], axis=0)
-    most = max(left_out_s, key=lambda code: left_out_s[code]) if flown_s else ReasonCode.NEVER_FLEW
+    left_out_s: dict[str, float] = {}
+    for code, each_s in zip(codes[1:], lost_s[1:].tolist(), strict=True):
+        if each_s:
+            left_out_s[f"{LEFT_OUT}{code.key}_s"] = left_out_s.get(f"{LEFT_OUT}{code.key}_s", 0.0) + each_s
+    flown_s = float(seconds[cause > 0].sum())
+    most = int(np.argmax(lost_s[1:])) + 1 if flown_s else 0
     why = Reason(
-        code=most,
-        field=next((each.field for each in conditions if each.code is most), "file"),
-        numbers={
-            "flown_s": flown_s,
-            "held_s": float(seconds[held].sum()),
-            **{f"left_out_by_{code}_s": lost_s for code, lost_s in left_out_s.items() if lost_s},
-            "needed_s": SHORTEST_PART_S,
-        },
+        code=codes[most],
+        field=conditions[most].field if most < len(conditions) else "file",
+        numbers={"flown_s": flown_s, "held_s": float(seconds[held].sum()), **left_out_s, "needed_s": SHORTEST_PART_S},
     )
     return found, why
 

@@ -49,7 +49,7 @@ def loop_of(flight: LoggedFlight) -> ArduPilotLoop:
 
 
 def refusal(content: bytes) -> tuple[str, str]:
-    with pytest.raises(TrajectoryError) as refused:
+    with pytest.raises(InputError) as refused:
         read(content)
     (problem,) = refused.value.problems
     return problem.field, problem.code
@@ -134,7 +134,7 @@ def test_filters_that_leave_nothing_together_tell_the_seconds_that_each_takes() 
         },
         abs=0.21,
     )
-    assert "left out are 2.9 s by other modes, " in problem.reason
+    assert "left out: 2.9 s (altitude not held), " in problem.reason
 
 
 def landing(flight: LoggedFlight, *, detected_s: float) -> LoggedFlight:
@@ -183,7 +183,7 @@ def test_a_landing_is_left_out_in_every_mode(mode: int, detected_s: float) -> No
         ({"FRAME_CLASS": 11.0}, "helicopter"),
         ({"FRAME_CLASS": 13.0}, "helicopter"),
         ({"H_SW_TYPE": 3.0}, "helicopter"),
-        ({"Q_ENABLE": 1.0}, "vtol"),
+        ({"Q_ENABLE": 1.0}, "VTOL"),
     ],
 )
 def test_another_kind_of_vehicle_is_known_by_its_parameters(parameters: dict[str, float], frame: str) -> None:

@@ -200,10 +200,10 @@ def test_another_kind_of_vehicle_is_refused(options: dict[str, Any], frame: str)
 @pytest.mark.parametrize(
     ("name", "value", "frame"),
     [
-        ("CA_AIRFRAME", 2.0, "vtol"),
+        ("CA_AIRFRAME", 2.0, "VTOL"),
         ("CA_AIRFRAME", 10.0, "helicopter"),
-        ("MAV_TYPE", 22.0, "vtol"),
-        ("SYS_AUTOSTART", 13000.0, "vtol"),
+        ("MAV_TYPE", 22.0, "VTOL"),
+        ("SYS_AUTOSTART", 13000.0, "VTOL"),
         ("CA_AIRFRAME", 0.0, ""),
         ("MAV_TYPE", 2.0, ""),
     ],

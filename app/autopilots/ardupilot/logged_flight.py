@@ -16,10 +16,11 @@ from app.autopilots.ardupilot.replica.parameters import (
     LOOP_RATE,
     LOOP_RATE_HZ,
     LOOP_RATES_HZ,
+    NEWER_NAMES,
     in_newer_names,
     parameters_from,
 )
-from app.autopilots.recording import EventKind, Parameters, Recording, Rows
+from app.autopilots.recording import EventKind, Recording, Rows
 from app.autopilots.segments import (
     LARGEST_LEAN,
     Condition,
@@ -33,13 +34,14 @@ from app.autopilots.segments import (
 )
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
+from app.core.control.parameter_checks import require_within
 from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples
 
 _TUNING: Final = ("demanded_throttle", "thrust", "hover_throttle")
 _ONE_OF_TWO: Final = (["desired_altitude_m"], ["reference_m"])
 """Columns without which the other one is the reference."""
-_HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
+HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
 """ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
@@ -70,10 +72,8 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
     refused = _refused(name)
     _require_messages(recording, refused)
     time_s = recording.columns["altitude_m"].time_s
-    lean, throttle = (
-        _lean(recording, time_s),
-        [within_limits(recording.columns[each].beside(time_s)) for each in _TUNING],
-    )
+    lean = _lean(recording, time_s)
+    throttle = [within_limits(recording.columns[each].beside(time_s)) for each in _TUNING]
     rows = _rows(recording, lean, throttle)
     motion = (rows.z_d_m, rows.z_m, rows.v_m_s, rows.a_m_s2, rows.v_d_m_s, rows.a_d_m_s2, rows.v_t_m_s, *throttle)
     is_sound = np.isfinite(np.sum(motion, axis=0)) & (np.abs(rows.a_m_s2) <= _LARGEST_ACCELERATION_M_S2)
@@ -96,26 +96,22 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         ArduPilotLoop.space.bounds,
         lambda gain: Reason(code=ReasonCode.PARAMETER_MISSING, field=gain, named=[*in_newer_names({gain: 0.0})]),
     )
+    require_within(given, {LOOP_RATE: LOOP_RATES_HZ})
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
     return LoggedFlight(
-        loop=_loop_of(recording, given, hover, refused),
+        loop=ArduPilotLoop(
+            parameters=parameters_from({**given, _LEARNED: hover}),
+            filter_hz=given.get(ACCELEROMETER_FILTER, ACCELEROMETER_FILTER_HZ),
+            step_s=1.0 / given.get(LOOP_RATE, LOOP_RATE_HZ),
+            has_newer_names=has_newer_names(recording),
+        ),
         segments=[rows.part(thinned(time_s, part)) for part in chosen],
     )
 
 
-def _loop_of(recording: Recording, given: Parameters, hover_throttle: float, refused: Refused) -> ArduPilotLoop:
-    """The loop with these parameters, by their names until release 4.6, and this learned throttle."""
-    rate_hz, (low, high) = given.get(LOOP_RATE, LOOP_RATE_HZ), LOOP_RATES_HZ
-    if not low <= rate_hz <= high:
-        numbers = {"low": low, "high": high, "value": rate_hz}
-        raise refused(Reason(code=ReasonCode.PARAMETER_OUT_OF_RANGE, field=LOOP_RATE, numbers=numbers))
-    newer = in_newer_names(dict.fromkeys(ArduPilotLoop.space.bounds, 0.0)).keys()
-    return ArduPilotLoop(
-        parameters=parameters_from({**given, _LEARNED: hover_throttle}),
-        filter_hz=given.get(ACCELEROMETER_FILTER, ACCELEROMETER_FILTER_HZ),
-        step_s=1.0 / rate_hz,
-        has_newer_names=any(each.name in newer for each in recording.settings),
-    )
+def has_newer_names(recording: Recording) -> bool:
+    """Whether the vehicle's parameters have the names of release 4.7."""
+    return any(each.name in NEWER_NAMES for each in recording.settings)
 
 
 def _rows(recording: Recording, lean: Samples, throttle: Sequence[Samples]) -> Segment:
@@ -170,7 +166,7 @@ def _in_flight(recording: Recording, time_s: Samples) -> Rows:
 
 
 def _holds_altitude(recording: Recording, time_s: Samples) -> Rows:
-    return np.isin(recording.at("mode", time_s), _HOLDS_ALTITUDE)
+    return np.isin(recording.at("mode", time_s), HOLDS_ALTITUDE)
 
 
 def _landings(recording: Recording, time_s: Samples) -> Rows:
@@ -186,7 +182,7 @@ def frame_of(recording: Recording) -> str:
     if any(name.startswith("H_") for name in latest) or latest.get("FRAME_CLASS") in _HELICOPTERS:
         return "helicopter"
     if latest.get("Q_ENABLE"):
-        return "vtol"
+        return "VTOL"
     return _FIRMWARES.get(recording.firmware, recording.firmware)
 
 

@@ -43,16 +43,16 @@ _KINDS: Final[Mapping[float, str]] = MappingProxyType({2: "plane", 3: "rover"})
 """Kinds of vehicle in its status, but for those with rotors, 1."""
 _AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = MappingProxyType(
     {
-        "CA_AIRFRAME": {"plane": range(1, 2), "vtol": range(2, 5), "rover": range(5, 7), "helicopter": range(10, 13)},
+        "CA_AIRFRAME": {"plane": range(1, 2), "VTOL": range(2, 5), "rover": range(5, 7), "helicopter": range(10, 13)},
         "MAV_TYPE": {
             "plane": range(1, 2), "helicopter": range(4, 5), "rover": range(10, 11), "boat": range(11, 12),
-            "submarine": range(12, 13), "vtol": range(19, 26),
+            "submarine": range(12, 13), "VTOL": range(19, 26),
         },
-        "SYS_AUTOSTART": {"vtol": range(13000, 14000), "plane": range(2100, 3000), "rover": range(50000, 51000)},
+        "SYS_AUTOSTART": {"VTOL": range(13000, 14000), "plane": range(2100, 3000), "rover": range(50000, 51000)},
     }
 )  # fmt: skip
 """Kinds by parameters of the airframe."""
-_LEFT_OUT: Final = (12.0, 17.0, 18.0, 20.0)
+LEFT_OUT_MODES: Final = (12.0, 17.0, 18.0, 20.0)
 """Modes: descend, takeoff, land, precision landing."""
 _JUMP_M: Final = 0.5
 _JUMP_M_S: Final = 2.0
@@ -167,7 +167,7 @@ def _coming_or_going(recording: Recording, time_s: Samples) -> Rows:
     downs_s += [span.end_s for span in recording.armed or () if np.isfinite(span.end_s)]
     landing = find_landings(altitude.time_s, altitude.values, recording.columns["climb_rate_m_s"].values, downs_s)
     after = np.minimum(np.searchsorted(altitude.time_s, time_s), len(landing) - 1)
-    return np.asarray(landing[after] | np.isin(recording.at("mode", time_s), _LEFT_OUT))
+    return np.asarray(landing[after] | np.isin(recording.at("mode", time_s), LEFT_OUT_MODES))
 
 
 def _is_reset(recording: Recording, rows: Segment) -> Rows:
@@ -237,7 +237,7 @@ def frame_of(recording: Recording) -> str:
     ]
     status = recording.columns.get("vehicle_type")
     reported = [] if status is None else np.unique(status.values).tolist()
-    by_status = ["vtol" if _ROTORS in reported else _KINDS[each] for each in reported if each in _KINDS]
+    by_status = ["VTOL" if _ROTORS in reported else _KINDS[each] for each in reported if each in _KINDS]
     return next(iter([*by_parameters, *by_status]), "")
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,16 @@ _OTHER_CONTROLLER_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_M_S2: Final = 1.5
 _LARGEST_MISFIT: Final = (0.005, 0.25)
 _LARGEST_SLOPE_DEVIATION: Final = 0.15
+
+
+class Grade(StrEnum):
+    """How much a log answers: gains are judged; the vehicle is fitted, or its hover throttle known, and no gains are
+    proposed; the flight is described; nothing."""
+
+    FULL = "full"
+    PARTIAL = "partial"
+    DESCRIPTION = "description"
+    REFUSED = "refused"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +95,11 @@ class Analysis:
     at_limit: Sequence[str]
     response: Response
     hover: HoverAdvice | None
+
+    @property
+    def grade(self) -> Grade:
+        """Full if gains are judged, be it that none are better."""
+        return Grade.PARTIAL if self.why_none is not None and self.why_none.code in _NOT_JUDGED else Grade.FULL
 
     @property
     def answer(self) -> str:
@@ -210,6 +226,7 @@ def _is_better(proposed: Assessment, present: Assessment) -> bool:
 
 
 _BETTER: Final = 0.95
+_NOT_JUDGED: Final = (ReasonCode.NO_WHOLE_CHANGE, ReasonCode.SLOPE_UNKNOWN)
 
 
 def _response(flight: LoggedFlight, estimate: CopterEstimate, gains: Mapping[str, float]) -> Response:

@@ -144,7 +144,7 @@ def parameters_from(values: Mapping[str, float]) -> Parameters:
     """
     unsupported = [(newer, older) for newer, (older, _) in NEWER_NAMES.items() if older in UNSUPPORTED]
     if problems := tuple(
-        Problem(older, f"must be 0 ({newer} since release 4.7)", code=ReasonCode.PARAMETER_UNSUPPORTED)
+        Problem(older, f"must be 0 ({newer} since release 4.7)", code=ReasonCode.PARAMETER_UNSUPPORTED.key)
         for newer, older in unsupported
         if values.get(older)
     ):
