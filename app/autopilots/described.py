@@ -23,13 +23,15 @@ _THROTTLES: Final = ("thrust_target", "thrust", "demanded_throttle", "throttle")
 """The first is the vertical part."""
 _IDLE: Final = 0.15
 _HOP_M: Final = 0.5
+_LARGEST: Final = 1e6
 
 
 def signals_of(recording: Recording) -> FlightSignals | None:
     """The signals of a flight; None of a recording without an altitude."""
     if "altitude_m" not in recording.columns:
         return None
-    time_s, altitude_m = recording.columns["altitude_m"].time_s, recording.columns["altitude_m"].values
+    time_s = recording.columns["altitude_m"].time_s
+    altitude_m = _known(recording, ("altitude_m",), time_s)
     climb_rate_m_s = _known(recording, ("climb_rate_m_s",), time_s)
     if not np.isfinite(climb_rate_m_s).any() and len(time_s) > 1:
         climb_rate_m_s = np.gradient(altitude_m, time_s)
@@ -72,13 +74,14 @@ _LOOPS: Final[Mapping[str, Callable[[Recording, Mapping[str, float]], AltitudeLo
 
 
 def _known(recording: Recording, names: Sequence[str], time_s: Samples) -> Samples:
-    """The first of these columns that there is, shape (n,); NaN where no report is near."""
+    """The first of these columns that there is, shape (n,); NaN where no report is near, or it is not plausible."""
     column = next((recording.columns[each] for each in names if each in recording.columns), None)
     if column is None:
         return np.full(len(time_s), np.nan)
     at_s = column.time_s
     nearest_s = at_s[np.searchsorted(0.5 * (at_s[1:] + at_s[:-1]), time_s)]
-    return np.where(np.abs(time_s - nearest_s) <= LONGEST_GAP_S, column.at(time_s), np.nan)
+    values = column.at(time_s)
+    return np.where((np.abs(time_s - nearest_s) <= LONGEST_GAP_S) & (np.abs(values) <= _LARGEST), values, np.nan)
 
 
 def _lean(recording: Recording, time_s: Samples) -> Samples:

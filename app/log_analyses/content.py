@@ -18,6 +18,7 @@ from app.core.analysis.description import Description, describe
 from app.core.analysis.hand_rules import UsualMargins, usual_margins
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, Problem, TrajectoryError
+from app.core.formatting import capitalised
 from app.core.reasons import ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
@@ -76,6 +77,7 @@ def analyze_content(
         reader, recording = _decoded(content, companion, name)
         autopilot, release, frame = recording.autopilot, recording.release, recording.frame
         tuning = _tuning(reader, recording, name)
+        frame = frame or "".join(each.named[0] for each in tuning.answer.reasons if each.code == _OTHER_KIND)
         replica = _compared(recording, name, gains)
     else:
         hint = f"For better gains use {ANALYSED}."
@@ -108,9 +110,11 @@ def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[Tuning
     description = None if signals is None else describe(signals)
     try:
         found = _analyzed(_flown(reader, recording, name), name)
+        notes = [*found.texts.notes, *(f"{capitalised(note)}." for note in recording.notes)]
+        found = replace(found, texts=found.texts.model_copy(update={"notes": notes}))
     except InputError as error:
         codes = {each.code for each in error.problems}
-        described = None if ReasonCode.NOT_A_COPTER.key in codes else description
+        described = None if _OTHER_KIND in codes else description
         margins = None if codes & _DOUBTFUL else _margins(recording, described)
         found = _Answered(*descriptions.answer_of(error, described, margins))
     if description is None or found.answer.grade is Grade.REFUSED:
@@ -139,6 +143,7 @@ def _margins(recording: Recording, description: Description | None) -> UsualMarg
     return None if loop is None else usual_margins(loop, description.hover_throttle)
 
 
+_OTHER_KIND: Final = ReasonCode.NOT_A_COPTER.key
 _DOUBTFUL: Final = frozenset(
     each.key
     for each in (

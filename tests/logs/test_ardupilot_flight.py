@@ -107,12 +107,8 @@ def test_a_manual_mode_is_refused() -> None:
 
 def test_a_log_that_never_left_the_ground_is_refused() -> None:
     idle = np.full_like(gusty().segments[0].throttle, 0.05)
-    assert refusal(ardupilot_log(changed(throttle=idle, throttle_filtered=idle), events=())) == ("EV", "never_flew")
-
-
-def test_a_log_that_begins_in_the_air_is_read() -> None:
-    """Without the event of a takeoff; with thrust from its first row on."""
-    assert spans_s(read(ardupilot_log(gusty(), events=()))) == [(10.0, 26.9)]
+    still = changed(throttle=idle, throttle_filtered=idle, z_m=np.zeros_like(idle), z_d_m=np.zeros_like(idle))
+    assert refusal(ardupilot_log(still, events=())) == ("EV", "never_flew")
 
 
 def test_filters_that_leave_nothing_together_tell_the_seconds_that_each_takes() -> None:

@@ -51,8 +51,6 @@ _LARGEST_ACCELERATION_M_S2: Final = 50.0
 _LEARNED: Final = "MOT_THST_HOVER"
 _THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX")
 _USED: Final = frozenset({*LOOP_NAMES, *_THRUST_CURVE} - {_LEARNED})
-_IDLE: Final = 0.15
-"""Thrust, share of full, above which a vehicle that reports no takeoff is in the air."""
 _HELICOPTERS: Final = (6.0, 11.0, 13.0)
 """FRAME_CLASS of helicopters with one rotor, two and four."""
 _FIRMWARES: Final[Mapping[str, str]] = MappingProxyType(
@@ -153,10 +151,8 @@ def _is_reset(rows: Segment) -> Rows:
 
 
 def _in_flight(recording: Recording, time_s: Samples) -> Rows:
-    """Rows between takeoff and landing, by the vehicle's own events; of a log that begins in the air, those with
-    thrust."""
-    lift_offs = recording.events_of(EventKind.LIFT_OFF)
-    flying = np.full(len(time_s), not lift_offs) & (recording.at("thrust", time_s) > _IDLE)
+    """Rows between takeoff and landing, by the vehicle's own events."""
+    flying = np.zeros(len(time_s), dtype=np.bool_)
     for event in recording.events_of(EventKind.LIFT_OFF, EventKind.LANDING, EventKind.BOOT):
         if event.kind is EventKind.LIFT_OFF:
             flying |= time_s >= event.time_s + _AFTER_TAKEOFF_S

@@ -98,7 +98,7 @@ class Analysis:
 
     @property
     def grade(self) -> Grade:
-        """Full if gains are judged, be it that none are better."""
+        """Full if gains are judged, even if none are better."""
         return Grade.PARTIAL if self.why_none is not None and self.why_none.code in _NOT_JUDGED else Grade.FULL
 
     @property
