@@ -130,13 +130,16 @@ def analyze_log(file: Path, *, gains: str, json_out: Path | None, params_out: Pa
     out = console(json_out)
     about = [each for each in (answer.autopilot, answer.release, answer.frame) if each]
     out.print(f"[bold]{escape(answer.file_name)}[/] ({escape(', '.join(about))})")
-    _print_part(out, f"Gains ({answer.tuning.grade})", answer.texts.tuning)
-    out.print()
-    _print_part(out, "Replica of the controller", answer.texts.replica)
+    is_refused, is_compared = answer.tuning.grade is Grade.REFUSED, not isinstance(answer.replica, Refusal)
+    tuning = (f"Gains ({answer.tuning.grade})", answer.texts.tuning)
+    replica = ("Replica of the controller", answer.texts.replica)
+    for title, texts in (replica, tuning) if is_refused and is_compared else (tuning, replica):
+        _print_part(out, title, texts)
+        out.print()
     write_json(json_out, answer.model_dump(mode="json"))
     if params_out is not None:
         _write_parameters(params_out, answer.texts.tuning)
-    if answer.tuning.grade is Grade.REFUSED and isinstance(answer.replica, Refusal):
+    if is_refused and not is_compared:
         raise typer.Exit(1)
 
 

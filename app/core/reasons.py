@@ -50,7 +50,7 @@ class ReasonCode(Enum):
     SATURATED = "has the throttle at a limit in {saturated_share:.0%} of its rows"
     SLOPE_UNKNOWN = "tells the thrust slope to ±{thrust_slope_deviation:.2f}; ±{needed_deviation:g} is needed"
     STEPS_TOO_CLOSE = "moves again within {apart_s:g} s: fly steps, and wait after each"
-    TOO_SHORT = "holds altitude for too short a time: {needed_s:g} s are needed"
+    TOO_SHORT = "leaves too short a time to analyse: {needed_s:g} s are needed"
     UNEXPLAINED_ACCELERATIONS = "has {residual_m_s2:.1f} m/s² of acceleration that the throttle does not explain"
     UNUSABLE = "cannot be used"
     VIBRATION_FAILSAFE = "has vibration compensation active in too much of the flight"
