@@ -90,7 +90,8 @@ def judge(number: int, *, rig: Rig, searches: bool = False) -> Result:
         if each.name == PROPOSED:
             within = (each.prediction.low_m, each.prediction.high_m)
             covered = [within[0] <= flight.error_m <= within[1] for flight in flights]
-    return Result(errors_m, best_m, covered, predicted, frozenset(rang), analysis.insufficient, searched)
+    why = None if analysis.why_none is None else analysis.why_none.code.key
+    return Result(errors_m, best_m, covered, predicted, frozenset(rang), why, searched)
 
 
 def rings(copter: SimulatedCopter, loop: AltitudeLoop) -> bool:

@@ -11,30 +11,29 @@ from typing import Final
 
 import numpy as np
 
+from app.autopilots.ardupilot import logged_flight as ardupilot_flight
 from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop, read_ardupilot
 from app.autopilots.ardupilot.log import MODES
 from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
+from app.autopilots.px4 import logged_flight as px4_flight
 from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.autopilots.recording import (
-    LONGEST_INTERVAL_S,
     ParameterHistory,
     Parameters,
     Recording,
-    Refused,
     Rows,
     held,
-    refusal,
 )
-from app.autopilots.segments import LARGEST_LEAN, SHORTEST_PART_S, Condition, choose_parts, jumps
+from app.autopilots.segments import LARGEST_LEAN, Condition, Refused, choose_parts, jumps
 from app.autopilots.tlog import SOURCES
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, FlownSteps
 from app.core.analysis.segment import LEAD_S
-from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
+from app.core.reasons import OTHER_FRAMES, Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples, Trajectory
 
 _STEPS_APART_S: Final = 1.0
@@ -53,12 +52,13 @@ _AT_REST_M: Final = 0.05
 class _Autopilot:
     """What differs between ArduCopter and PX4.
 
-    `number_of_mode` is of the custom mode in a heartbeat; `mode` is the one whose set points the vehicle reports.
-    `messages` are needed. Of the parameters, the gains in `bounds` are needed, and `learned` if there is one, which the
-    vehicle changes by itself; `kept` are all on which the loop depends.
-    `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
+    `frame_of` names a vehicle that is no copter. `number_of_mode` is of the custom mode in a heartbeat; `mode` is the
+    one whose set points the vehicle reports. `messages` are needed. Of the parameters, the gains in `bounds` are
+    needed, and `learned` if there is one, which the vehicle changes by itself; `kept` are all on which the loop
+    depends. `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
     """
 
+    frame_of: Callable[[Recording], str]
     number_of_mode: Callable[[int], int]
     mode: int
     modes: Mapping[float, str]
@@ -71,7 +71,7 @@ class _Autopilot:
 
     def mode_name(self, mode: int) -> str:
         """As its users call it."""
-        return self.modes.get(mode, f"mode {mode}")
+        return self.modes.get(mode, f"mode-{mode}")
 
 
 _ASK: Final = (
@@ -91,6 +91,7 @@ _MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, HOVER_RA
 _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
     {
         "ardupilot": _Autopilot(
+            frame_of=ardupilot_flight.frame_of,
             number_of_mode=lambda mode: mode,
             mode=4,
             modes=MODES,
@@ -107,6 +108,7 @@ _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
             ),
         ),
         "px4": _Autopilot(
+            frame_of=px4_flight.frame_of,
             number_of_mode=lambda mode: mode >> 16 & 0xFF,
             mode=6,
             modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
@@ -144,17 +146,15 @@ class _Reader:
     autopilot: _Autopilot
 
     def read(self) -> LoggedFlight:
-        if frame := self.recording.frame:
-            raise self._refused("file", f"is the log of {frame}, not of a copter with several rotors")
-        if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
-            noted = (*problems, *(Problem("file", note) for note in self.recording.notes))
-            raise TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=noted)
+        frame = (
+            self.recording.frame if self.recording.frame in OTHER_FRAMES else self.autopilot.frame_of(self.recording)
+        )
+        if frame:
+            raise self._refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
+        if reasons := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
+            raise refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, reasons, self.recording.notes)
         rows = self._rows()
         time_s, target_m = rows.time_s, rows["set_point_m"]
-        none_found = (
-            f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
-            "in one of the messages, a jump in altitude or a parameter change"
-        )
         given, parts = choose_parts(
             time_s,
             self._conditions(rows),
@@ -162,9 +162,8 @@ class _Reader:
             ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned),
             np.diff(target_m, prepend=target_m[0]) / np.diff(time_s, prepend=time_s[0] - 1.0),
             self._refused,
-            ("LOCAL_POSITION_NED", none_found),
             self.autopilot.bounds,
-            lambda _: "was changed after the flight, and was not read before",
+            lambda gain: Reason(code=ReasonCode.PARAMETER_READ_LATE, field=gain),
         )
         part = max((slice(*each) for each in parts), key=lambda each: float(np.ptp(target_m[each])))
         begin_s = float(time_s[part.start])
@@ -194,7 +193,7 @@ class _Reader:
 
     def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
         if self.autopilot.shapes_reference:
-            loop = replace(ardupilot_loop(given), has_newer_names=self._has_newer_names)
+            loop = replace(ardupilot_loop(given), has_newer_names=ardupilot_flight.has_newer_names(self.recording))
             return read_ardupilot(loop, trajectory, self._steps(trajectory))
         hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
         whole = FlownSteps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
@@ -208,10 +207,12 @@ class _Reader:
         rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
         field = "POSITION_TARGET_LOCAL_NED"
         if not rows:
-            raise self._refused(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
+            numbers, named = {"rest_s": LEAD_S}, [self._mode]
+            raise self._refused(Reason(code=ReasonCode.NO_STEPS, field=field, numbers=numbers, named=named))
         times_s = time_s[rows]
         if np.any(np.diff(times_s) < _STEPS_APART_S):
-            raise self._refused(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
+            numbers = {"apart_s": _STEPS_APART_S}
+            raise self._refused(Reason(code=ReasonCode.STEPS_TOO_CLOSE, field=field, numbers=numbers))
         end_s = time_s[found[len(rows)]] if len(found) > len(rows) else time_s[-1]
         return FlownSteps(
             set_points=SetPoints(
@@ -226,10 +227,10 @@ class _Reader:
         time_s, lean = rows.time_s, self.recording.columns["lean"].beside(rows.time_s)
         is_known = np.isfinite(np.sum([*rows.channels.values(), lean], axis=0))
         return (
-            (_follows(self.recording, self.autopilot, time_s), "HEARTBEAT", f"has no flight in {self._mode}"),
-            (is_known, "LOCAL_POSITION_NED", "has no rows beside all the other messages"),
-            (self._is_off_ground(rows), "LOCAL_POSITION_NED", f"never is {_OFF_GROUND_M:g} m above the ground"),
-            (lean >= LARGEST_LEAN, "ATTITUDE_TARGET", "leans by more than 30° throughout the flight"),
+            Condition(self._is_off_ground(rows), ReasonCode.NEVER_FLEW, "LOCAL_POSITION_NED"),
+            Condition(_follows(self.recording, self.autopilot, time_s), ReasonCode.ALTITUDE_NOT_HELD, "HEARTBEAT"),
+            Condition(is_known, ReasonCode.GAPS, "LOCAL_POSITION_NED"),
+            Condition(lean >= LARGEST_LEAN, ReasonCode.LEANS, "ATTITUDE_TARGET"),
         )
 
     def _is_off_ground(self, rows: Trajectory) -> Rows:
@@ -239,16 +240,16 @@ class _Reader:
         above_m = rows["altitude_m"] - rows["altitude_m"][rested]
         return np.asarray((rested < 0) | (above_m > _OFF_GROUND_M))
 
-    def _sparse_messages(self) -> Iterator[Problem]:
+    def _sparse_messages(self) -> Iterator[Reason]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
         for message in self.autopilot.messages:
             found = [each.time_s for name, each in self.recording.columns.items() if SOURCES[name].message == message]
             rate_hz = self._rate_hz(found[0]) if found else 0.0
             if not found:
-                yield Problem(message, "is missing")
+                yield Reason(code=ReasonCode.MESSAGE_MISSING, field=message)
             elif rate_hz * LARGEST_INTERVAL_S < 1.0:
-                rate = f"{rate_hz:.1f} times" if rate_hz else "less than once"
-                yield Problem(message, f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed")
+                numbers = {"rate_hz": rate_hz, "needed_hz": 1.0 / LARGEST_INTERVAL_S}
+                yield Reason(code=ReasonCode.MESSAGE_RARE, field=message, numbers=numbers)
 
     def _rate_hz(self, at_s: Samples) -> float:
         following = _follows(self.recording, self.autopilot, at_s)
@@ -256,25 +257,21 @@ class _Reader:
         counted = intervals_s[intervals_s <= _INTERRUPTED_S]
         return 1.0 / float(counted.mean()) if counted.size else 0.0
 
-    def _missing_mode(self) -> Iterator[Problem]:
+    def _missing_mode(self) -> Iterator[Reason]:
         armed, mode = self.recording.columns["is_armed"], self.recording.columns["mode"]
         flown = [self.autopilot.number_of_mode(int(each)) for each in mode.values[armed.values > 0.0].tolist()]
         if not flown:
-            yield Problem("HEARTBEAT", "never reports armed motors")
+            yield Reason(code=ReasonCode.NEVER_ARMED, field="HEARTBEAT")
         elif self.autopilot.mode not in flown:
-            modes = ", ".join(self.autopilot.mode_name(each) for each in dict.fromkeys(flown))
-            yield Problem(
-                "HEARTBEAT",
-                f"has no flight in {self._mode}, only in {modes}, where the messages do not determine the reference",
-            )
+            modes = [self.autopilot.mode_name(each) for each in dict.fromkeys(flown)]
+            yield Reason(code=ReasonCode.OTHER_MODES, field="HEARTBEAT", named=[self._mode, *modes])
 
-    def _missing_parameters(self) -> Iterator[Problem]:
+    def _missing_parameters(self) -> Iterator[Reason]:
         known = {name for _, name, _ in self._settings()}
         for each in (*self.autopilot.bounds, self.autopilot.learned):
             if each and each not in known:
-                newer = next(iter(in_newer_names({each: 0.0})))
-                renamed = f", nor {newer} of release 4.7" if newer != each else ""
-                yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
+                newer = [name for name in in_newer_names({each: 0.0}) if name != each]
+                yield Reason(code=ReasonCode.PARAMETER_MISSING, field=each, named=newer)
 
     def _settings(self) -> Iterator[tuple[float, str, float]]:
         """Parameters by their older names, in order of time; values that nobody had written before hold from −∞ on."""
@@ -294,11 +291,11 @@ class _Reader:
         """By the names of the vehicle's release."""
         known = {*given, self.autopilot.learned, *_IN_TAKEOFFS, *_MAY_LACK}
         absent = [each for each in self.autopilot.kept if each not in known]
-        return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
-
-    @property
-    def _has_newer_names(self) -> bool:
-        return any(each.name in ardupilot.NEWER_NAMES for each in self.recording.settings)
+        return (
+            tuple(in_newer_names(dict.fromkeys(absent, 0.0)))
+            if ardupilot_flight.has_newer_names(self.recording)
+            else tuple(absent)
+        )
 
     @property
     def _mode(self) -> str:
@@ -306,7 +303,9 @@ class _Reader:
 
     @property
     def _refused(self) -> Refused:
-        return refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, self.recording.notes)
+        return lambda reason: refusal(
+            f"{self.name} cannot be analysed.", self.autopilot.hint, [reason], self.recording.notes
+        )
 
 
 def _follows(recording: Recording, autopilot: _Autopilot, time_s: Samples) -> Rows:

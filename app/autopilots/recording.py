@@ -181,7 +181,8 @@ class ParameterHistory:
 class Recording:
     """A recording of one vehicle, `system` in MAVLink, under an `autopilot`.
 
-    `firmware` and `frame` are named if they are not those of a copter with several rotors. `sources` are the messages
+    `firmware` is named if it is not that of a copter; `release` is its version and `frame` that of the vehicle, as far
+    as they are known, one of `OTHER_FRAMES` if it is no copter with several rotors. `sources` are the messages
     that it has, of which some are columns. `in_air` are the intervals from lift-off to touchdown, `armed`
     those with the motors armed, both as reported by the autopilot and in order; None if it does not report them.
     `blocks` are the intervals in blocks of a flight plan, each from the command that activated it. `notes` say what was
@@ -195,6 +196,7 @@ class Recording:
     clock: str = "vehicle"
     system: int = 1
     firmware: str = ""
+    release: str = ""
     frame: str = ""
     columns: Mapping[str, Column]
     sources: Collection[str] = ()

@@ -26,10 +26,10 @@ _POSITIONS: Final = (32, 33, 30)
 _USUAL_COMPONENT: Final = 1
 _FRAMES: Final[Mapping[int, str]] = MappingProxyType(
     dict.fromkeys((2, 3, 13, 14, 15, 29, 35, 43), "")
-    | {1: "a fixed-wing aircraft", 4: "a helicopter", 5: "an antenna tracker", 10: "a rover", 11: "a boat"}
-    | {12: "a submarine", **dict.fromkeys((*range(19, 26), 47), "an aircraft that takes off vertically (VTOL)")}
+    | {1: "plane", 4: "helicopter", 5: "tracker", 7: "airship", 10: "rover", 11: "boat", 12: "submarine"}
+    | dict.fromkeys((*range(19, 26), 47), "VTOL")
 )
-"""By the kind of vehicle in the heartbeat; empty for a copter with several rotors."""
+"""By the kind of vehicle in the heartbeat; empty for a copter with several rotors, and the others are no copter."""
 _NO_VEHICLES: Final = frozenset({6, 18, 26, 27, *range(30, 35), *range(36, 43), 44, 48, 49})
 """Kinds that are no vehicles: ground stations, companion computers, gimbals, cameras and other devices."""
 
@@ -45,8 +45,8 @@ class Vehicle:
 
     @property
     def frame(self) -> str:
-        """What it is, if not a copter with several rotors."""
-        return _FRAMES.get(self.kind, f"a vehicle of MAVLink's type {self.kind}")
+        """What it is, one of `OTHER_FRAMES`; empty if it is a copter with several rotors."""
+        return _FRAMES.get(self.kind, "other")
 
     def sends(self, heartbeat: Message) -> bool:
         """Whether a heartbeat with its address is its own, and not of another program under this address."""

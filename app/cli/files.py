@@ -3,7 +3,7 @@ out, and whole campaigns in and out.
 """
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Final, Literal
@@ -23,10 +23,11 @@ from app.campaigns.trials.schemas import Trial
 from app.cli.console import console, reading, table, write_json, writing
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
+from app.core.analysis.analysis import Grade
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.log_analyses.schemas import Refusal, ReplicaAnswer, TextTable, TuningAnswer
+from app.log_analyses.schemas import PartTexts, Refusal
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
@@ -115,7 +116,8 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
 def analyze_log(file: Path, *, gains: str, vehicle: int | None, json_out: Path | None, params_out: Path | None) -> None:
     """Print the analysis of a log, and write it and the proposed parameters where asked for.
 
-    Raises InputError for a log that cannot be analysed, and for a parameter file where nothing is proposed.
+    Raises InputError for a file that cannot be read, and for a parameter file where nothing is proposed; exits with 1
+    for a log that answers nothing.
     """
     from app.log_analyses.content import ANALYSED, analyze_content  # noqa: PLC0415 - imports every reader
 
@@ -124,51 +126,42 @@ def analyze_log(file: Path, *, gains: str, vehicle: int | None, json_out: Path |
         content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
     answer, _ = analyze_content(content, companion, file.name, gains, vehicle)
     out = console(json_out)
-    out.print(f"[bold]{escape(answer.file_name)}[/]")
-    tuning, replica = answer.tuning, answer.replica
-    if isinstance(tuning, Refusal):
-        _print_refusal(out, "No gains", tuning)
-    else:
-        facts = [f"Flight: {', '.join(tuning.flight)}.", f"Vehicle: {', '.join(tuning.vehicle)}."]
-        _print_answer(out, facts, tuning, tuning.gains, "This flight with other gains")
-    out.print()
-    if isinstance(replica, Refusal):
-        _print_refusal(out, "Not compared with the replica of the controller", replica)
-    else:
-        facts = [f"Replica of the controller: {', '.join(replica.facts)}."]
-        _print_answer(out, facts, replica, replica.table, "Recording and replica")
+    about = [each for each in (answer.autopilot, answer.release, answer.frame) if each]
+    out.print(f"[bold]{escape(answer.file_name)}[/] ({escape(', '.join(about))})")
+    is_refused, is_compared = answer.tuning.grade is Grade.REFUSED, not isinstance(answer.replica, Refusal)
+    tuning = (f"Gains ({answer.tuning.grade})", answer.texts.tuning)
+    replica = ("Replica of the controller", answer.texts.replica)
+    for title, texts in (replica, tuning) if is_refused and is_compared else (tuning, replica):
+        _print_part(out, title, texts)
+        out.print()
     write_json(json_out, answer.model_dump(mode="json"))
     if params_out is not None:
-        _write_parameters(params_out, tuning)
+        _write_parameters(params_out, answer.texts.tuning)
+    if is_refused and not is_compared:
+        raise typer.Exit(1)
 
 
-def _print_answer(
-    out: Console, facts: Sequence[str], answer: TuningAnswer | ReplicaAnswer, cells: TextTable, title: str
-) -> None:
-    for fact in facts:
-        out.print(escape(fact))
-    out.print(table(cells.columns, cells.rows, title=title))
-    for note in answer.notes:
+def _print_part(out: Console, title: str, texts: PartTexts) -> None:
+    out.print(escape(f"{title}: {texts.answer}"))
+    for reason in texts.reasons:
+        out.print(escape(f"  {reason}"))
+    for facts in texts.facts:
+        out.print(escape(f"{facts.title}: {', '.join(facts.values)}."))
+    if texts.table is not None:
+        out.print(table(texts.table.columns, texts.table.rows, title=texts.table.title))
+    for note in texts.notes:
         out.print(escape(note), style="dim")
-    out.print(escape(answer.answer))
 
 
-def _print_refusal(out: Console, what: str, why: Refusal) -> None:
-    out.print(escape(f"{what}: {why.title}"))
-    for problem in why.problems:
-        out.print(escape(f"  {problem.field}: {problem.reason}"))
-    out.print(escape(why.hint), style="dim")
-
-
-def _write_parameters(target: Path, answer: TuningAnswer | Refusal) -> None:
-    if isinstance(answer, Refusal) or answer.parameter_file is None:
+def _write_parameters(target: Path, texts: PartTexts) -> None:
+    if texts.parameter_file is None:
         raise InputError(
             "No parameter file was written, because nothing is proposed.",
-            hint=answer.title if isinstance(answer, Refusal) else answer.answer,
+            hint=texts.answer,
             problems=(Problem("--params", "has nothing to write"),),
         )
     with writing("--params", target):
-        target.write_text(answer.parameter_file.content, encoding="utf-8")
+        target.write_text(texts.parameter_file.content, encoding="utf-8")
 
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:

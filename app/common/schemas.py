@@ -5,6 +5,7 @@ like another.
 """
 
 import unicodedata
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Annotated, Final, Generic, Self, TypeVar
 
@@ -88,13 +89,15 @@ class Request(Schema):
 
 class ProblemField(Schema):
     """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
-    pass, by name, where any are known. `code` is the reason, or the value of the field that would pass, for programs;
-    empty where there is none."""
+    pass, by name, where any are known. `code` is for programs: of a record, the reason or the value of the field that
+    would pass; of a log, the reason, with its numbers and what else it names. Empty where there is none."""
 
     field: str
     reason: str
     offer: Gains = {}
     code: str = ""
+    numbers: Mapping[str, float] = {}
+    named: Sequence[str] = ()
 
 
 class Problem(Schema):

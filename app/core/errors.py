@@ -7,7 +7,7 @@ GainlineError
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 
@@ -16,14 +16,17 @@ class Problem:
     """One refused field.
 
     `field` is its name as the caller wrote it (dotted, `gains.kp`), `reason` why it was refused; `offer` holds gains
-    that would pass, by name, if any are known. `code` tells programs what the reason is, or the value of the field that
-    would pass.
+    that would pass, by name, if any are known. `code` is for programs: of a record, the reason or the value of the
+    field that would pass; of a log, the reason (`app.core.reasons`), with its `numbers`, by names that end in their
+    unit, and what else it names in `named`.
     """
 
     field: str
     reason: str
     offer: Mapping[str, float] = dataclasses.field(default_factory=dict)
     code: str = ""
+    numbers: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    named: Sequence[str] = ()
 
 
 class GainlineError(Exception):

@@ -2,24 +2,28 @@
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import Final, Generic, TypeVar
 
 from app.autopilots.autopilot import Autopilot
+from app.autopilots.described import loop_of, signals_of
 from app.autopilots.log_readers import Reader, reader_of
 from app.autopilots.recording import Recording
 from app.autopilots.replica_check import LoopReplica, ReplicaCheck
 from app.autopilots.replicas import REPLICAS, traced
 from app.autopilots.takeoffs import Takeoff
 from app.campaigns.schemas import Definition
-from app.common.schemas import ProblemField
-from app.core.analysis.analysis import analyze
+from app.core.analysis.analysis import Grade, analyze
+from app.core.analysis.description import Description, describe
+from app.core.analysis.hand_rules import UsualMargins, usual_margins
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.formatting import capitalised
+from app.core.reasons import ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
-from app.log_analyses import manoeuvres, replicas, takeoffs
-from app.log_analyses.schemas import LogAnswer, Part, Refusal, ReplicaAnswer, TuningAnswer
+from app.log_analyses import descriptions, manoeuvres, replicas, takeoffs
+from app.log_analyses.schemas import LogAnswer, Part, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
 from app.logs.base import HEAD_BYTES
 from app.logs.formats import NEVER_WRITTEN, Format, recognise
 
@@ -34,7 +38,7 @@ _OTHER_FILES: Final[Mapping[Format | None, str]] = {
     Format.ZEROS: NEVER_WRITTEN,
 }
 
-Answer = TypeVar("Answer", TuningAnswer, ReplicaAnswer)
+_Answer = TypeVar("_Answer", TuningAnswer, ReplicaAnswer, Refusal)
 
 
 def _decoded(
@@ -65,58 +69,108 @@ def analyze_content(
     """The answer of a log or trace in memory, and the figures of its parts; takes some seconds.
 
     `gains` are `KP,KI,KD` as flown, if the log does not contain them; `vehicle` is the system id of the one to analyse,
-    by default that with the most to learn. Raises InputError that names what is missing or wrong where neither part has
-    an answer.
+    by default that with the most to learn. Raises InputError that names what is wrong with a file that cannot be read;
+    what a log lacks is in its answer.
     """
-    autopilot = traced(content[:HEAD_BYTES])
+    autopilot, release, frame = traced(content[:HEAD_BYTES]), "", ""
+    replica: _Answered[ReplicaAnswer] | _Answered[Refusal]
     if autopilot is None:
         reader, recording = _decoded(content, companion, name, vehicle)
-        autopilot = recording.autopilot
-        tuning, plots = _answered(lambda: _tuning(reader.flown(recording, name), name))
-        if isinstance(tuning, TuningAnswer):
-            notes = [*tuning.notes, *(f"{capitalised(note)}." for note in recording.notes)]
-            tuning = tuning.model_copy(update={"notes": notes})
-        checked = _answered(lambda: _checked(autopilot, lambda loop: loop.check_log(recording, name, gains)))
+        autopilot, release, frame = recording.autopilot, recording.release, recording.frame
+        tuning = _tuning(reader, recording, name)
+        frame = frame or "".join(each.named[0] for each in tuning.answer.reasons if each.code == _OTHER_KIND)
+        replica = _compared(recording, name, gains)
     else:
         hint = f"For better gains use {ANALYSED}."
-        tuning, plots = InputError(f"{name} is a trace of the loop, not the log of a flight.", hint=hint), []
-        checked = _checked(autopilot, lambda loop: loop.check_trace(io.BytesIO(content), name))
-    replica, overlays = checked
-    if isinstance(tuning, InputError) and isinstance(replica, InputError):
-        asks_for_gains = any(problem.field == "gains" for problem in replica.problems)
-        raise replica if asks_for_gains else tuning
+        why = InputError(f"{name} is a trace of the loop, not the log of a flight.", hint=hint)
+        tuning = _Answered(*descriptions.answer_of(why, None, None))
+        replica = _checked(autopilot, lambda loop: loop.check_trace(io.BytesIO(content), name))
     answer = LogAnswer(
-        file_name=name, autopilot=autopilot.title, tuning=_or_refusal(tuning), replica=_or_refusal(replica)
+        file_name=name,
+        autopilot=autopilot.title,
+        release=release or None,
+        frame=frame or None,
+        tuning=tuning.answer,
+        replica=replica.answer,
+        texts=Texts(tuning=tuning.texts, replica=replica.texts),
     )
-    return answer, {"tuning": plots, "replica": overlays}
+    return answer, {"tuning": tuning.plots, "replica": replica.plots}
 
 
-def _tuning(flown: LoggedFlight | Sequence[Takeoff], name: str) -> tuple[TuningAnswer, list[Plot]]:
+@dataclass(frozen=True, slots=True)
+class _Answered(Generic[_Answer]):
+    """A part of the answer: in numbers, for a person, and its figures."""
+
+    answer: _Answer
+    texts: PartTexts
+    plots: list[Plot] = field(default_factory=list)
+
+
+def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[TuningAnswer]:
+    signals = signals_of(recording)
+    description = None if signals is None else describe(signals)
+    try:
+        found = _analyzed(reader.flown(recording, name), name)
+        notes = [*found.texts.notes, *(f"{capitalised(note)}." for note in recording.notes)]
+        found = replace(found, texts=found.texts.model_copy(update={"notes": notes}))
+    except InputError as error:
+        codes = {each.code for each in error.problems}
+        described = None if _OTHER_KIND in codes else description
+        margins = None if codes & _DOUBTFUL else _margins(recording, described)
+        found = _Answered(*descriptions.answer_of(error, described, margins))
+    if description is None or found.answer.grade is Grade.REFUSED:
+        return found
+    facts = [*found.texts.facts, descriptions.flight_facts(description)]
+    return replace(
+        found,
+        answer=found.answer.model_copy(update={"description": description}),
+        texts=found.texts.model_copy(update={"facts": facts}),
+    )
+
+
+def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[TuningAnswer]:
     if isinstance(flown, LoggedFlight):
         flight = analyze(flown)
-        return manoeuvres.answer_of(flight, name, flown.assumed), [manoeuvres.plot_of(flight)]
+        return _Answered(*manoeuvres.answer_of(flight, name, flown.assumed), [manoeuvres.plot_of(flight)])
     takeoff = analyze_takeoffs(takeoffs.logged_takeoffs(flown, name=name))
-    return takeoffs.answer_of(takeoff, name), [takeoffs.plot_of(takeoff)]
+    return _Answered(*takeoffs.answer_of(takeoff, name), [takeoffs.plot_of(takeoff)])
 
 
-def _checked(autopilot: Autopilot, check: Callable[[LoopReplica], ReplicaCheck]) -> tuple[ReplicaAnswer, list[Plot]]:
+def _margins(recording: Recording, description: Description | None) -> UsualMargins | None:
+    """Margins with the hover throttle of a flight, if its gains are known."""
+    if description is None or description.hover_throttle is None:
+        return None
+    loop = loop_of(recording, recording.columns["altitude_m"].time_s[-1])
+    return None if loop is None else usual_margins(loop, description.hover_throttle)
+
+
+_OTHER_KIND: Final = ReasonCode.NOT_A_COPTER.key
+_DOUBTFUL: Final = frozenset(
+    each.key
+    for each in (
+        ReasonCode.CONSTANT_SIGNAL,
+        ReasonCode.DEVIATION_NOT_EXPLAINED,
+        ReasonCode.OTHER_CONTROLLER,
+        ReasonCode.PARAMETER_READ_LATE,
+        ReasonCode.PARAMETER_UNSUPPORTED,
+        ReasonCode.UNEXPLAINED_ACCELERATIONS,
+    )
+)
+"""Reasons why something else than the gains in the log may have flown."""
+
+
+def _checked(autopilot: Autopilot, check: Callable[[LoopReplica], ReplicaCheck]) -> _Answered[ReplicaAnswer]:
     loop = REPLICAS.get(autopilot)
     if loop is None:
         hint = "Its logs are analysed without it."
         raise InputError(f"Gainline has no replica of {autopilot.title}'s vertical loop.", hint=hint)
     found = check(loop)
-    return replicas.answer_of(found), replicas.plots_of(found, loop)
+    return _Answered(*replicas.answer_of(found), replicas.plots_of(found, loop))
 
 
-def _answered(part: Callable[[], tuple[Answer, list[Plot]]]) -> tuple[Answer | InputError, list[Plot]]:
+def _compared(recording: Recording, name: str, gains: str) -> _Answered[ReplicaAnswer] | _Answered[Refusal]:
     try:
-        return part()
+        return _checked(recording.autopilot, lambda loop: loop.check_log(recording, name, gains))
     except InputError as error:
-        return error, []
-
-
-def _or_refusal(part: Answer | InputError) -> Answer | Refusal:
-    if not isinstance(part, InputError):
-        return part
-    problems = [ProblemField.view_of(each) for each in part.problems]
-    return Refusal(title=part.message, hint=part.hint, problems=problems)
+        reasons = descriptions.reasons_of(error, ReasonCode.NOT_COMPARED)
+        return _Answered(Refusal(reasons=reasons), descriptions.texts_of(error))

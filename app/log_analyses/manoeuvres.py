@@ -19,9 +19,12 @@ from app.figures.panels import Line, Panel, Plot
 from app.log_analyses.schemas import (
     EstimatedValue,
     EstimatedVehicle,
+    Facts,
     GainsInManoeuvre,
     ManoeuvreNumbers,
     ParameterFile,
+    PartTexts,
+    ReasonField,
     TextTable,
     TuningAnswer,
 )
@@ -33,23 +36,27 @@ _LEAST_SPREAD: Final = 0.01
 _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
 
-def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> TuningAnswer:
-    """The answer in facts and numbers; `assumed` are the parameters that the log lacks, for which the firmware's
-    defaults were assumed."""
-    content = analysis.parameter_file(file_name)
+def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> tuple[TuningAnswer, PartTexts]:
+    """The answer in numbers, and for a person; `assumed` are the parameters that the log lacks, for which the
+    firmware's defaults were assumed."""
+    content, why = analysis.parameter_file(file_name), analysis.why_none
     name = f"{PurePath(file_name).stem}{analysis.loop.texts.parameter_suffix}"
-    return TuningAnswer(
-        answer=analysis.answer,
+    answer = TuningAnswer(
+        grade=analysis.grade,
+        reasons=[] if why is None else [ReasonField.view_of(why.problem)],
         proposes=analysis.proposed is not None,
         starts_campaign=analysis.proposed is not None,
         experiment=_STEPS[analysis.loop.texts.autopilot].name,
-        flight=_flight(analysis),
-        vehicle=_vehicle(analysis),
-        gains=_table(analysis),
+        numbers=_numbers(analysis, assumed),
+    )
+    texts = PartTexts(
+        answer=analysis.answer,
+        facts=[Facts(title="Flight", values=_flight(analysis)), Facts(title="Vehicle", values=_vehicle(analysis))],
+        table=_table(analysis),
         notes=_notes(analysis, assumed),
         parameter_file=None if content is None else ParameterFile(name=name, content=content),
-        numbers=_numbers(analysis),
     )
+    return answer, texts
 
 
 def plot_of(analysis: Analysis) -> Plot:
@@ -93,7 +100,7 @@ def _vehicle(analysis: Analysis) -> list[str]:
     ]
 
 
-def _numbers(analysis: Analysis) -> ManoeuvreNumbers:
+def _numbers(analysis: Analysis, assumed: Sequence[str]) -> ManoeuvreNumbers:
     mean, deviation = analysis.estimate.mean, analysis.estimate.deviation
     values = {each: EstimatedValue(mean=getattr(mean, each), deviation=getattr(deviation, each)) for each in _FITTED}
     return ManoeuvreNumbers.view_of(
@@ -105,6 +112,7 @@ def _numbers(analysis: Analysis) -> ManoeuvreNumbers:
         ),
         assessments=[_assessed(each) for each in analysis.assessments],
         proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
+        assumed=list(assumed),
     )
 
 
@@ -127,6 +135,7 @@ def _table(analysis: Analysis) -> TextTable:
     listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
     names = [name.removeprefix(analysis.loop.texts.prefix) for name in flown.gains]
     return TextTable(
+        title="This flight with other gains",
         columns=["Gains", *names, "Predicted error", "90 % interval", "Throttle activity", "Margin"],
         rows=[_row(each) for each in listed],
     )
@@ -134,15 +143,19 @@ def _table(analysis: Analysis) -> TextTable:
 
 def _row(each: Assessment) -> list[str]:
     low, high = each.prediction.low_m, each.prediction.high_m
-    margin = "< 1" if not each.margin else f"{each.margin:.1f}" if each.margin < LARGEST_MARGIN else "> 8"
     return [
         each.name,
         *(f"{value:g}" for value in each.gains.values()),
         _mm(each.prediction.error_m),
         f"{1e3 * low:.1f} … {_mm(high)}",
         f"{each.activity:.2f}",
-        margin,
+        margin_text(each.margin),
     ]
+
+
+def margin_text(margin: float) -> str:
+    """A margin as in a table."""
+    return "< 1" if not margin else f"{margin:.1f}" if margin < LARGEST_MARGIN else f"> {LARGEST_MARGIN:g}"
 
 
 def _notes(analysis: Analysis, assumed: Sequence[str]) -> list[str]:

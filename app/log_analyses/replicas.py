@@ -11,7 +11,7 @@ from app.autopilots.replica_check import Kind, LoopReplica, ReplicaCheck, Signal
 from app.core.formatting import NOTHING, format_gains
 from app.core.records.trajectory import Overlay, Samples, select_samples
 from app.figures.panels import Line, Panel, Plot, Style
-from app.log_analyses.schemas import ReplicaAnswer, TextTable
+from app.log_analyses.schemas import Facts, PartTexts, ReplicaAnswer, TextTable
 
 _KINDS: Final[Mapping[Kind, str]] = MappingProxyType({"log": "flight log", "trace": "step-by-step trace"})
 _CURVE_POINTS: Final = 1000
@@ -19,20 +19,19 @@ _MARKS: Final = 200
 _IN_FULL: Final = 1e-6
 
 
-def answer_of(check: ReplicaCheck) -> ReplicaAnswer:
-    """The answer in facts and numbers."""
+def answer_of(check: ReplicaCheck) -> tuple[ReplicaAnswer, PartTexts]:
+    """The answer in numbers, and for a person."""
     gains = "" if check.gains is None else f"{format_gains(check.gains)}, "
     allowed: dict[str, list[str]] = {}
     for signal in check.signals:
         allowed.setdefault(signal.allowance, []).append(signal.name)
-    return ReplicaAnswer.view_of(
-        check,
+    texts = PartTexts(
         answer=check.sentence,
-        agrees=check.passed,
-        facts=[_KINDS[check.kind], f"gains {gains}{check.gains_from}"],
+        facts=[Facts(title="Recording", values=[_KINDS[check.kind], f"gains {gains}{check.gains_from}"])],
         table=_table(check),
         notes=[*(f"{', '.join(names)}: {allowance}." for allowance, names in allowed.items()), *check.notes],
     )
+    return ReplicaAnswer.view_of(check, agrees=check.passed), texts
 
 
 def plots_of(check: ReplicaCheck, replica: LoopReplica) -> list[Plot]:
@@ -67,6 +66,7 @@ def _table(check: ReplicaCheck) -> TextTable:
     are_medians = any(signal.median_difference is not None for signal in check.signals)
     medians = ["Median difference", "Allowed median"] if are_medians else ["Allowed"]
     return TextTable(
+        title="Recording and replica",
         columns=["Signal", "Result", "Largest difference", *medians, "Differing samples"],
         rows=[_row(signal, are_medians=are_medians) for signal in check.signals],
     )

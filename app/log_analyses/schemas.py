@@ -3,13 +3,19 @@
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from app.autopilots.replica_check import Kind, SignalResult
-from app.common.schemas import Gains, ProblemField, Schema
-from app.core.analysis.analysis import Behaviour
+from app.autopilots.replica_check import Kind, Verdict
+from app.common.schemas import Gains, Schema
+from app.core.analysis.analysis import Behaviour, Grade
+from app.core.analysis.description import Description
+from app.core.analysis.hand_rules import UsualGains
+from app.core.models.copter import Copter
 from app.figures.base import Card
 from app.figures.theme import ThemeName
+
+Unit = Annotated[str, AfterValidator(lambda unit: unit.replace(" ", "_"))]
+"""A unit in one word: of_full."""
 
 
 class EstimatedValue(Schema):
@@ -58,7 +64,7 @@ class GainsInTakeoff(AssessedGains):
     """A gain set in another takeoff to 3 m."""
 
     flown_error_m: Annotated[float | None, Field(description="mean error of the takeoffs with these gains in the log")]
-    refusal: Annotated[str, Field(description="why the gate refuses these gains; empty: it does not")]
+    passes_gate: bool
 
 
 class HoverSetting(Schema):
@@ -74,7 +80,6 @@ class HoverSetting(Schema):
             "the gain sets but the first are then assessed with the proposed value"
         ),
     ]
-    reason: str
 
 
 class ManoeuvreNumbers(Schema):
@@ -86,6 +91,15 @@ class ManoeuvreNumbers(Schema):
     proposed: GainsInManoeuvre | None
     at_limit: Annotated[list[str], Field(description="proposed gains at an end of the range that was searched")]
     hover: Annotated[HoverSetting | None, Field(description="none if the present value suits")]
+    assumed: Annotated[list[str], Field(description="parameters not in the log, assumed to have their default")]
+
+
+class UsualNumbers(Schema):
+    """Margins on a copter with the hover throttle of the log and what is usual, where it tells the gains and no more.
+    `assessments` begins with the gains flown; a margin of 0 is less than 1, and one of 8 at least 8."""
+
+    vehicle: Copter
+    assessments: Sequence[UsualGains]
 
 
 class FittedValue(Schema):
@@ -93,7 +107,7 @@ class FittedValue(Schema):
 
     name: str
     title: str
-    unit: str
+    unit: Unit
     value: float
     standard_error: float
 
@@ -118,6 +132,7 @@ class TakeoffNumbers(Schema):
 class TextTable(Schema):
     """A table of formatted cells."""
 
+    title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
 
@@ -129,59 +144,107 @@ class ParameterFile(Schema):
     content: str
 
 
-class TuningAnswer(Schema):
-    """How the altitude was controlled, the fitted vehicle, and better gains."""
+class Facts(Schema):
+    """Formatted numbers about one thing."""
+
+    title: str
+    values: Sequence[str]
+
+
+class PartTexts(Schema):
+    """A part of the answer for a person."""
 
     answer: str
-    proposes: Annotated[bool, Field(description="whether gains are proposed; if not, `answer` says why")]
-    starts_campaign: Annotated[bool, Field(description="whether a campaign can start from this log")]
+    reasons: Annotated[Sequence[str], Field(description="the part's reasons as sentences")] = ()
+    facts: Sequence[Facts] = ()
+    table: TextTable | None = None
+    notes: Annotated[Sequence[str], Field(description="how to read the table, precautions, what to do")] = ()
+    parameter_file: ParameterFile | None = None
+
+
+class ReasonField(Schema):
+    """Why a part does not answer, or not in full."""
+
+    code: Annotated[str, Field(description="a code of app.core.reasons")]
+    field: Annotated[str, Field(description="the message, column or parameter concerned; file: the whole log")]
+    numbers: Annotated[dict[str, float], Field(description="by names that end in their unit")]
+    named: Annotated[list[str], Field(description="what else the reason names: modes, parameters, a kind of vehicle")]
+
+
+class TuningAnswer(Schema):
+    """How the altitude was controlled, the vehicle, and better gains, as far as the log tells."""
+
+    grade: Annotated[
+        Grade,
+        Field(
+            description="full: gains are judged; partial: the vehicle is fitted or its hover throttle known, and no "
+            "gains are proposed; description: the flight alone; refused: nothing"
+        ),
+    ]
+    reasons: Annotated[Sequence[ReasonField], Field(description="why the grade is no better, or nothing is proposed")]
+    proposes: Annotated[bool, Field(description="whether gains are proposed")] = False
+    starts_campaign: Annotated[bool, Field(description="whether a campaign can start from this log")] = False
     experiment: Annotated[
         str | None,
         Field(description="of this campaign, for a vehicle that flies it; null: the vehicle is flown elsewhere"),
-    ]
-    flight: Annotated[Sequence[str], Field(description="how the altitude was controlled")]
-    vehicle: Annotated[Sequence[str], Field(description="the fitted vehicle")]
-    gains: Annotated[TextTable, Field(description="the sets flown, the proposed one, and others")]
-    notes: Annotated[Sequence[str], Field(description="how to read the table, and precautions")]
-    parameter_file: ParameterFile | None
-    numbers: ManoeuvreNumbers | TakeoffNumbers
+    ] = None
+    description: Annotated[Description | None, Field(description="the whole flight as it was flown")] = None
+    numbers: ManoeuvreNumbers | UsualNumbers | TakeoffNumbers | None = None
+
+
+class SignalNumbers(Schema):
+    """Result of one signal: the largest difference between recording and replica, the tolerance, and the number of
+    samples that differ by more; of a signal judged by its median difference, the tolerance is the median's."""
+
+    name: str
+    difference_unit: Unit
+    largest_difference: float
+    tolerance: float
+    verdict: Verdict
+    different: int
+    first_different_s: float | None
+    median_difference: float | None
 
 
 class ReplicaAnswer(Schema):
     """How well Gainline's replica of the autopilot's vertical loop explains the log."""
 
-    answer: str
     agrees: Annotated[bool, Field(description="whether every signal does")]
     kind: Annotated[Kind, Field(description="the log of a flight, or a trace with every step")]
-    facts: Annotated[Sequence[str], Field(description="what was compared, and the gains")]
-    table: Annotated[TextTable, Field(description="the difference of every signal")]
-    notes: Annotated[Sequence[str], Field(description="what is allowed, and how it was compared")]
     rows: Annotated[int, Field(description="number of samples or steps compared")]
     first_different_row: Annotated[int | None, Field(description="counted from 0; null: none, or not counted")]
     gains: Annotated[Gains | None, Field(description="null if they change within the recording")]
-    gains_from: str
     better_gains: Annotated[Gains | None, Field(description="other gains that reproduce more of the commands")]
-    signals: Sequence[SignalResult]
+    signals: Sequence[SignalNumbers]
 
 
 class Refusal(Schema):
-    """Why the log does not answer: what happened, the fields concerned, and what to do."""
+    """Why the log is not compared with a replica."""
 
-    title: str
-    hint: str
-    problems: list[ProblemField]
-
-
-class LogAnswer(Schema):
-    """The result of a log analysis without its figures: at least one of both parts."""
-
-    file_name: str
-    autopilot: Annotated[str, Field(description="its title")]
-    tuning: TuningAnswer | Refusal
-    replica: ReplicaAnswer | Refusal
+    reasons: Sequence[ReasonField]
 
 
 Part = Literal["tuning", "replica"]
+
+
+class Texts(Schema):
+    """All that is written for a person."""
+
+    tuning: PartTexts
+    replica: PartTexts
+
+
+class LogAnswer(Schema):
+    """The result of a log analysis without its figures: numbers and codes, and in `texts` alone what a person reads."""
+
+    schema_version: Literal[1] = 1
+    file_name: str
+    autopilot: Annotated[str, Field(description="its title")]
+    release: Annotated[str | None, Field(description="of the firmware; null: not in the log")]
+    frame: Annotated[str | None, Field(description="of the vehicle; null: not in the log")]
+    tuning: TuningAnswer
+    replica: ReplicaAnswer | Refusal
+    texts: Texts
 
 
 class LogAnalysis(LogAnswer):

@@ -5,16 +5,21 @@ from pathlib import PurePath
 from typing import Final
 
 from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
+from app.core.analysis.analysis import Grade
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
+from app.core.reasons import Reason, ReasonCode
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
 from app.figures.data import Curve, thinned
 from app.figures.panels import Line, Panel, Plot, Style
 from app.log_analyses.schemas import (
+    Facts,
     GainsInTakeoff,
     ParameterFile,
+    PartTexts,
+    ReasonField,
     TakeoffNumbers,
     TextTable,
     TuningAnswer,
@@ -45,20 +50,19 @@ def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeof
     return known
 
 
-def answer_of(analysis: TakeoffAnalysis, file_name: str) -> TuningAnswer:
-    """The answer in facts and numbers."""
-    return TuningAnswer(
+def answer_of(analysis: TakeoffAnalysis, file_name: str) -> tuple[TuningAnswer, PartTexts]:
+    """The answer in numbers, and for a person."""
+    proposes = analysis.proposed is not None
+    why = [] if proposes else [ReasonField.view_of(Reason(code=ReasonCode.NONE_BETTER).problem)]
+    texts = PartTexts(
         answer=analysis.answer,
-        proposes=analysis.proposed is not None,
-        starts_campaign=True,
-        experiment=None,
-        flight=_flight(analysis),
-        vehicle=_vehicle(analysis),
-        gains=_table(analysis),
+        facts=[Facts(title="Flight", values=_flight(analysis)), Facts(title="Vehicle", values=_vehicle(analysis))],
+        table=_table(analysis),
         notes=_notes(analysis),
         parameter_file=_airframe_section(analysis, file_name),
-        numbers=_numbers(analysis),
     )
+    numbers = _numbers(analysis)
+    return TuningAnswer(grade=Grade.FULL, reasons=why, proposes=proposes, starts_campaign=True, numbers=numbers), texts
 
 
 def plot_of(analysis: TakeoffAnalysis) -> Plot:
@@ -138,6 +142,7 @@ def _table(analysis: TakeoffAnalysis) -> TextTable:
     flown, *others = analysis.assessments
     listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
     return TextTable(
+        title="The takeoff with other gains",
         columns=["Gains", *flown.gains, "Flown", "Predicted", "90 % interval", "Gate"],
         rows=[
             [
@@ -187,4 +192,6 @@ def _numbers(analysis: TakeoffAnalysis) -> TakeoffNumbers:
 
 def _assessed(each: AssessedGains) -> GainsInTakeoff:
     low_m, high_m = each.interval.lower, each.interval.upper
-    return GainsInTakeoff.view_of(each, error_m=each.predicted_error_m, low_m=low_m, high_m=high_m)
+    return GainsInTakeoff.view_of(
+        each, error_m=each.predicted_error_m, low_m=low_m, high_m=high_m, passes_gate=not each.refusal
+    )

@@ -9,6 +9,7 @@ from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
+from tests.log_analyses.documents import require_data
 from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log
@@ -47,12 +48,13 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, motor lag 0 ± 3 ms" in " ".join(result.output.split())
     for name in ("As flown", "Proposed", "ArduCopter's default gains", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
         assert name in result.output
-    found = json.loads(document.read_text())["tuning"]
-    numbers = found["numbers"]
+    found = json.loads(document.read_text())
+    require_data(found)
+    numbers = found["tuning"]["numbers"]
     gains = numbers["proposed"]["gains"]
     assert numbers["proposed"]["error_m"] < 0.2 * numbers["assessments"][0]["error_m"]
     assert numbers["vehicle"]["thrust_slope"]["mean"] == pytest.approx(1.0, abs=0.01)
-    assert found["answer"] in " ".join(result.output.split())
+    assert found["texts"]["tuning"]["answer"] in " ".join(result.output.split())
     lines = lines_of(parameters)
     assert {line.split(",")[0]: float(line.split(",")[1]) for line in lines} == pytest.approx(gains)
 
@@ -95,8 +97,8 @@ def test_a_trace_is_compared_with_the_replica_and_gives_no_gains(tmp_path: Path)
     result = analyze(TRACE, "--json", document)
     assert result.exit_code == 0, result.output
     output = " ".join(result.output.split())
-    assert f"No gains: {TRACE.name} is a trace of the loop, not the log of a flight." in output
-    assert "Replica of the controller: step-by-step trace, gains kp 283, ki 13, kd 82, of the recording." in output
+    assert f"Gains (refused): {TRACE.name} is a trace of the loop, not the log of a flight." in output
+    assert "Recording: step-by-step trace, gains kp 283, ki 13, kd 82, of the recording." in output
     assert "thrust, commanded thrust exact 0 counts 0 counts" in output
     assert "steps are exact in all 7 signals" in output
     found = json.loads(document.read_text())
@@ -109,7 +111,7 @@ def test_the_replica_uses_the_gains_given(tmp_path: Path) -> None:
     output = analyze(flight, "--gains", "300,13,82").output
     assert "The replica differs" in output
     assert "More commands match with kp 283, ki 13, kd 82: were other gains flown?" in output
-    assert "gains: must be three whole numbers, KP,KI,KD" in analyze(flight, "--gains", "1,2").output
+    assert "gains must be three whole numbers, KP,KI,KD" in analyze(flight, "--gains", "1,2").output
 
 
 @pytest.mark.complete
@@ -143,7 +145,7 @@ def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> No
     path.write_bytes(ardupilot_log(simulated_flight(told, seed=3), parameters={**PARAMETERS, "MOT_THST_HOVER": 0.4}))
     result = analyze(path)
     assert result.exit_code == 0
-    assert "is not sufficient to propose gains" in " ".join(result.output.split())
+    assert "does not suffice to propose gains" in " ".join(result.output.split())
     refused = analyze(path, "--params", parameters)
     assert refused.exit_code == 1
     assert "No parameter file was written" in refused.output

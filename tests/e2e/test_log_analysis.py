@@ -84,7 +84,7 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
     article = page.get_by_role("article", name="Analysis of takeoff.tlog")
     expect(article).to_contain_text("Mean distance from 3 m: 0.330 m measured.")
     expect(article).to_contain_text("hover throttle 0.63")
-    expect(article).to_contain_text("It contains no VERT_LOOP, the loop's inputs and commands.")
+    expect(article).to_contain_text("The log contains no VERT_LOOP, the loop's inputs and commands.")
     rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
     expect(rows).to_have_count(2)
     assert "Predicted with the proposed gains" in {
@@ -106,17 +106,22 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
     assert [f"{gains[name]:g}" for name in ("kp", "ki", "kd")] == proposed
 
 
-def test_a_log_that_gives_no_gains_says_why_below_what_it_tells(page_of_analysis: Dashboard) -> None:
+def test_a_log_that_gives_no_gains_says_why_and_tells_what_it_can(page_of_analysis: Dashboard) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.bin", recorded("px4_takeoff.ulg"))
     headings = page.get_by_role("article", name="Analysis of takeoff.bin").get_by_role("heading", level=2)
     expect(headings.first).to_have_text("takeoff.bin")
-    expect(headings.nth(1)).to_have_text("Replica of the controller")
-    expect(headings.last).to_have_text("No gains from this log")
-    expect(page.get_by_role("article")).to_contain_text("Takeoffs are left out: their ramp decides, not the gains.")
+    expect(headings.nth(1)).to_have_text("Gains")
+    expect(headings.nth(2)).to_have_text("Replica of the controller")
+    article = page.get_by_role("article")
+    expect(article).to_contain_text("Partial answer")
+    expect(article).to_contain_text("left out: 9.4 s (only takeoffs or landings)")
+    expect(article.get_by_label("Whole flight")).to_contain_text("Hover throttle")
+    expect(article.get_by_role("region", name="Gains compared").locator("tbody tr")).to_have_count(4)
+    expect(article).to_contain_text("Takeoffs are left out: their ramp decides, not the gains.")
     choose(dashboard, "flight.bin", ardupilot_log(simulated_flight(GUSTY)))
     expect(page.get_by_role("article", name="Analysis of flight.bin")).to_be_visible()
-    expect(page.get_by_text("No gains from this log")).to_have_count(0)
+    expect(page.get_by_text("Full answer")).to_be_visible()
 
 
 def test_one_click_shows_what_the_replica_is(page_of_analysis: Dashboard) -> None:
@@ -158,7 +163,7 @@ def test_a_calm_log_asks_for_its_gains(page_of_analysis: Dashboard) -> None:
     lines = data_of(Flight(DEFAULT)).splitlines()
     calm = "\n".join(line for line in lines if float(line.split()[0]) > 40.0)
     choose(dashboard, "calm.data", calm.encode())
-    expect(page.get_by_role("alert")).to_contain_text("calm.data does not contain the gains flown")
+    expect(page.get_by_role("article")).to_contain_text("calm.data does not contain the gains flown")
     page.get_by_label("Gains flown: kp, ki, kd").fill("283, 13, 82")
     dashboard.button("Analyse calm.data with these gains").click()
     expect(page.get_by_role("article")).to_contain_text("The replica agrees: ")

@@ -13,6 +13,7 @@ from app.figures.theme import PALETTES
 from tests.builders import Json, get, problems_of, run_jobs
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.fleet.vehicles import register
+from tests.log_analyses.documents import require_data
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import Telemetry, recorded
 from tests.logs.written_px4 import px4_log
@@ -30,16 +31,18 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
     assert answer.status_code == 200, answer.text
     analysis = answer.json()
     assert (analysis["file_name"], analysis["autopilot"]) == ("steps.bin", "ArduCopter")
-    found = analysis["tuning"]
+    found, texts = analysis["tuning"], analysis["texts"]["tuning"]
+    require_data({name: part for name, part in analysis.items() if name != "figures"})
+    assert (found["grade"], found["reasons"], analysis["schema_version"]) == ("full", [], 1)
     numbers = found["numbers"]
     assert numbers["vehicle"]["thrust_slope"]["mean"] == pytest.approx(1.0, abs=0.01)
     assert numbers["vehicle"]["assumed_hover_throttle"] == pytest.approx(0.39)
     assert numbers["proposed"]["error_m"] < 0.2 * numbers["assessments"][0]["error_m"]
     assert found["experiment"] == "altitude-steps-ardupilot"
     assert (found["proposes"], found["starts_campaign"]) == (True, True)
-    assert found["answer"].startswith("Mean deviation: 23.4 mm measured.")
-    assert found["parameter_file"]["name"] == "steps.param"
-    assert "PSC_POSZ_P,3\n" in found["parameter_file"]["content"]
+    assert texts["answer"].startswith("Mean deviation: 23.4 mm measured.")
+    assert texts["parameter_file"]["name"] == "steps.param"
+    assert "PSC_POSZ_P,3\n" in texts["parameter_file"]["content"]
     assert analysis["figures"].keys() == {"light", "dark"}
     drawn = analysis["figures"]["dark"]["tuning"][0]["figure"]["data"]
     assert [(one["meta"]["panel"], one["meta"]["line"]) for one in drawn] == [
@@ -64,28 +67,16 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
 
 
 @pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        (
-            "arducopter_takeoff.bin",
-            "holds altitude for 4.8 s only; 6 s are needed; the vehicle hovers at a throttle of 0.37",
-        ),
-        (
-            "px4_takeoff.ulg",
-            (
-                "has no 4 s with an altitude to follow between takeoff and landing, without a gap of 0.25 s, a reset "
-                "of the estimator or a parameter change"
-            ),
-        ),
-    ],
+    ("name", "code"),
+    [("arducopter_takeoff.bin", "too_short"), ("px4_takeoff.ulg", "only_takeoffs_or_landings")],
 )
 def test_a_log_from_which_no_gains_follow_says_why_and_is_compared_with_the_replica(
-    client: TestClient, name: str, reason: str
+    client: TestClient, name: str, code: str
 ) -> None:
     answer = send(client, name, recorded(name))
     assert answer.status_code == 200, answer.text
     found = answer.json()
-    assert [problem["reason"] for problem in found["tuning"]["problems"]] == [reason]
+    assert [problem["code"] for problem in found["tuning"]["reasons"]] == [code]
     assert found["replica"]["agrees"]
     assert (found["figures"]["light"]["tuning"], len(found["figures"]["light"]["replica"]) > 0) == ([], True)
 
@@ -93,18 +84,19 @@ def test_a_log_from_which_no_gains_follow_says_why_and_is_compared_with_the_repl
 def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -> None:
     """The vehicle hovers at 0.40, and was told 0.35; P falls short of the hand rule's 8 because of the activity."""
     analysis = send(client, "flight.ulg", px4_log(simulated_px4())).json()
-    found = analysis["tuning"]
+    found, texts = analysis["tuning"], analysis["texts"]["tuning"]
+    require_data({name: part for name, part in analysis.items() if name != "figures"})
     assert (analysis["autopilot"], found["proposes"]) == ("PX4", True)
     assert (found["experiment"], found["starts_campaign"]) == ("altitude-steps-px4", True)
     vehicle = found["numbers"]["vehicle"]
     assert vehicle["hover_throttle"]["mean"] == pytest.approx(0.40, abs=0.01)
     assert vehicle["assumed_hover_throttle"] == pytest.approx(0.35)
-    assert any("but MPC_THR_HOVER was 0.350" in fact for fact in found["vehicle"])
+    assert any("but MPC_THR_HOVER was 0.350" in fact for fact in texts["facts"][1]["values"])
     hover = found["numbers"]["hover"]
     assert (hover["parameter"], hover["present"], hover["is_outside"]) == ("MPC_THR_HOVER", pytest.approx(0.35), False)
-    assert hover["reason"] in found["notes"]
-    assert found["gains"]["columns"][:5] == ["Gains", "Z_P", "Z_VEL_P_ACC", "Z_VEL_I_ACC", "Z_VEL_D_ACC"]
-    assert [row[0] for row in found["gains"]["rows"]] == [
+    assert any("Set MPC_THR_HOVER to" in note for note in texts["notes"])
+    assert texts["table"]["columns"][:5] == ["Gains", "Z_P", "Z_VEL_P_ACC", "Z_VEL_I_ACC", "Z_VEL_D_ACC"]
+    assert [row[0] for row in texts["table"]["rows"]] == [
         "As flown",
         "Proposed",
         "PX4's default gains",
@@ -117,12 +109,12 @@ def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -
     assert proposed["gains"]["MPC_Z_VEL_P_ACC"] < 8.0
     by_hand = found["numbers"]["assessments"][2]
     assert by_hand["error_m"] <= proposed["high_m"]
-    assert f"1.5, 8, 3, 0 is predicted as good: {1e3 * by_hand['error_m']:.1f} mm" in found["answer"]
-    assert "1, 4, 2, 0 is predicted as good" not in found["answer"]
-    assert any("30 ms of extra dead time" in note for note in found["notes"])
-    assert found["parameter_file"]["name"] == "flight.params"
-    assert "# MPC_Z_VEL_P_ACC was 4\n" in found["parameter_file"]["content"]
-    lines = [line.split("\t") for line in found["parameter_file"]["content"].splitlines() if not line.startswith("#")]
+    assert f"1.5, 8, 3, 0 is predicted as good: {1e3 * by_hand['error_m']:.1f} mm" in texts["answer"]
+    assert "1, 4, 2, 0 is predicted as good" not in texts["answer"]
+    assert any("30 ms of extra dead time" in note for note in texts["notes"])
+    assert texts["parameter_file"]["name"] == "flight.params"
+    assert "# MPC_Z_VEL_P_ACC was 4\n" in texts["parameter_file"]["content"]
+    lines = [line.split("\t") for line in texts["parameter_file"]["content"].splitlines() if not line.startswith("#")]
     assert [(vehicle, component, kind) for vehicle, component, _, _, kind in lines] == [("7", "1", "9")] * 5
     values = {name: float(value) for _, _, name, value, _ in lines}
     assert values == pytest.approx({**proposed["gains"], "MPC_THR_HOVER": hover["proposed"]})
@@ -147,16 +139,17 @@ def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
 
 def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(client: TestClient) -> None:
     analysis = send(client, "flight.tlog", recorded("paparazzi_283_13_82.tlog")).json()
-    found = analysis["tuning"]
+    found, texts = analysis["tuning"], analysis["texts"]["tuning"]
+    require_data({name: part for name, part in analysis.items() if name != "figures"})
     assert (analysis["autopilot"], found["proposes"]) == ("Paparazzi", True)
-    assert "contains no VERT_LOOP" in analysis["replica"]["problems"][0]["reason"]
+    assert "contains no VERT_LOOP" in analysis["texts"]["replica"]["reasons"][0]
     assert (found["experiment"], found["starts_campaign"]) == (None, True)
-    assert found["gains"]["columns"] == ["Gains", "kp", "ki", "kd", "Flown", "Predicted", "90 % interval", "Gate"]
-    assert [row[0] for row in found["gains"]["rows"]] == ["As flown", "Proposed"]
-    assert found["gains"]["rows"][0][:5] == ["As flown", "283", "13", "82", "0.330 m"]
+    assert texts["table"]["columns"] == ["Gains", "kp", "ki", "kd", "Flown", "Predicted", "90 % interval", "Gate"]
+    assert [row[0] for row in texts["table"]["rows"]] == ["As flown", "Proposed"]
+    assert texts["table"]["rows"][0][:5] == ["As flown", "283", "13", "82", "0.330 m"]
     proposed = found["numbers"]["proposed"]
-    assert found["parameter_file"]["name"] == "flight.xml"
-    section = ElementTree.fromstring(found["parameter_file"]["content"])
+    assert texts["parameter_file"]["name"] == "flight.xml"
+    section = ElementTree.fromstring(texts["parameter_file"]["content"])
     defined = {each.attrib["name"]: float(each.attrib["value"]) for each in section}
     assert defined == {f"HOVER_{name.upper()}": value for name, value in proposed["gains"].items()}
     drawn = analysis["figures"]["light"]["tuning"][0]["figure"]["data"]
@@ -172,12 +165,14 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(client
 def test_a_ground_log_needs_its_companion_for_the_gains(client: TestClient) -> None:
     data = data_of(Flight(gains={"kp": 283, "ki": 13, "kd": 82}))
     alone = send(client, "flight.data", re.sub(r"(VERT_LOOP(?: \S+){13}) \S+", r"\1 777", data).encode())
-    assert problems_of(alone) == {"gains": "are needed"}
-    assert "Add the .log file written with it" in alone.json()["hint"]
+    found = alone.json()
+    assert [each["field"] for each in found["replica"]["reasons"]] == ["gains"]
+    assert found["texts"]["replica"]["reasons"] == ["gains are needed."]
+    assert "Add the .log file written with it" in found["texts"]["replica"]["notes"][0]
     files = {"file": ("flight.data", data.encode()), "companion": ("flight.log", COMPANION.encode())}
     answer = client.post(PATH, files=files)
     assert answer.status_code == 200, answer.text
-    assert answer.json()["tuning"]["gains"]["rows"][0][:4] == ["As flown", "283", "13", "82"]
+    assert answer.json()["texts"]["tuning"]["table"]["rows"][0][:4] == ["As flown", "283", "13", "82"]
 
 
 def test_a_telemetry_log_of_a_copter_without_steps_is_refused_for_what_it_lacks(client: TestClient) -> None:
@@ -186,15 +181,18 @@ def test_a_telemetry_log_of_a_copter_without_steps_is_refused_for_what_it_lacks(
     log.heartbeat()
     log.fly(20.0, to_m=3.0)
     answer = send(client, "copter.tlog", log.content)
-    assert answer.status_code == 422
-    problems = problems_of(answer)
-    assert [name for name, reason in problems.items() if reason == "is missing"] == [
+    assert answer.status_code == 200
+    found = answer.json()["tuning"]
+    assert found["grade"] == "description"
+    assert 2.0 < found["description"]["altitude_range_m"] <= 3.0
+    problems = {each["field"]: each["code"] for each in found["reasons"]}
+    assert [name for name, code in problems.items() if code == "message_missing"] == [
         "NAV_CONTROLLER_OUTPUT",
         "ATTITUDE_TARGET",
         "POSITION_TARGET_LOCAL_NED",
     ]
     assert "PSC_VELZ_P" in problems
-    assert problems_of(start(client, "copter.tlog", log.content)) == problems
+    assert problems_of(start(client, "copter.tlog", log.content)).keys() == problems.keys()
     assert client.get("/api/campaigns").json()["items"] == []
 
 

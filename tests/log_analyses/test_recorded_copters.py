@@ -14,7 +14,6 @@ from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.log_analyses.content import analyze_content
-from app.log_analyses.schemas import TuningAnswer
 from app.logs.base import HEAD_BYTES
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
@@ -99,10 +98,10 @@ def test_a_flight_in_wind_gets_a_proposal(flown: RecordedFlight) -> None:
 @pytest.mark.complete
 def test_steps_to_the_side_at_one_altitude_are_described_without_a_proposal() -> None:
     """The only altitude change is the end of the takeoff."""
-    answer = analyze_content(recorded("arducopter_lateral_steps.bin"), None, "lateral.bin")[0].tuning
-    assert isinstance(answer, TuningAnswer)
-    assert not answer.proposes
-    assert "no altitude change both begins and ends in it" in answer.answer
-    assert answer.flight[:2] == ["70 s analysed", "reference moves by 2.0 m"]
-    assert answer.vehicle[0] == "hover throttle 0.364"
-    assert answer.parameter_file is None
+    found = analyze_content(recorded("arducopter_lateral_steps.bin"), None, "lateral.bin")[0]
+    answer, texts = found.tuning, found.texts.tuning
+    assert (answer.grade, answer.proposes) == ("partial", False)
+    assert [each.code for each in answer.reasons] == ["no_whole_change"]
+    assert texts.facts[0].values[:2] == ["70 s analysed", "reference moves by 2.0 m"]
+    assert texts.facts[1].values[0] == "hover throttle 0.364"
+    assert texts.parameter_file is None

@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 
 from app.core.control.vertical_guidance import OUTPUTS
 from tests.builders import Json, get, problems_of
+from tests.log_analyses.documents import require_data
 from tests.logs import recorded as logs
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 
@@ -29,13 +30,18 @@ def send(
 
 
 def part_of(answer: httpx2.Response) -> Json:
-    """The replica's part, with its figures in light colours."""
+    """The replica's part, with its texts, and its figures in light colours."""
     assert answer.status_code == 200, answer.text
     analysis = answer.json()
-    part: Json = analysis["replica"] | {
-        "autopilot": analysis["autopilot"],
-        "figures": analysis["figures"]["light"]["replica"],
-    }
+    require_data({name: part for name, part in analysis.items() if name != "figures"})
+    part: Json = (
+        analysis["replica"]
+        | analysis["texts"]["replica"]
+        | {
+            "autopilot": analysis["autopilot"],
+            "figures": analysis["figures"]["light"]["replica"],
+        }
+    )
     return part
 
 
@@ -61,7 +67,7 @@ def test_a_recorded_run_is_exact_in_every_signal(client: TestClient) -> None:
     assert part["table"]["columns"] == ["Signal", "Result", "Largest difference", "Allowed", "Differing samples"]
     assert part["table"]["rows"][-1] == ["thrust, commanded thrust", "exact", "0 counts", "0 counts", "–"]
     assert part["notes"][0] == f"{', '.join(OUTPUTS)}: compared bit for bit."
-    assert "is a trace of the loop" in answer.json()["tuning"]["title"]
+    assert "is a trace of the loop" in answer.json()["texts"]["tuning"]["answer"]
     assert answer.json()["figures"]["light"]["tuning"] == []
     assert len(answer.content) < 1_000_000
 
@@ -172,7 +178,8 @@ def test_what_is_drawn_is_the_recording_in_its_units_and_the_replica_over_it(cli
 
 def test_a_log_of_the_replica_agrees_with_it_with_the_gains_of_its_companion(client: TestClient) -> None:
     part = part_of(send(client, "flight.data", data_of(Flight(DEFAULT, stale=True)), companion=COMPANION))
-    assert (part["agrees"], part["gains"], part["gains_from"], part["rows"]) == (True, DEFAULT, "of the log", 669)
+    assert (part["agrees"], part["gains"], part["rows"]) == (True, DEFAULT, 669)
+    assert part["facts"][0]["values"][1].endswith("of the log")
     assert "of 669 commands are bit-exact, the other" in part["answer"]
     found = by_name(part)
     assert [found[name]["largest_difference"] for name in ("z_ref", "zd_ref", "zdd_ref")] == [0.0, 0.0, 0.0]
@@ -180,7 +187,7 @@ def test_a_log_of_the_replica_agrees_with_it_with_the_gains_of_its_companion(cli
     assert (found["z_ref"]["verdict"], found["fb_cmd"]["verdict"]) == ("exact", "agrees")
     assert any(note.startswith("Commands reproduced only with the state one step apart") for note in part["notes"])
     alone = part_of(send(client, "flight.data", data_of(Flight(DEFAULT))))
-    assert alone["gains_from"] == "computed from the commands"
+    assert alone["facts"][0]["values"][1].endswith("computed from the commands")
 
 
 @pytest.mark.complete
@@ -191,7 +198,7 @@ def test_every_row_of_a_recorded_log_follows_with_the_gains_of_its_time(client: 
     assert part["answer"].replace("\N{NARROW NO-BREAK SPACE}", "") == (
         "The replica agrees: 1986 of 1986 commands are bit-exact."
     )
-    assert (part["gains"], part["gains_from"]) == (None, "of the log")
+    assert (part["gains"], part["facts"][0]["values"][1]) == (None, "gains of the log")
     notes = " ".join(part["notes"])
     assert "kp 283, ki 13, kd 82; after 94.9 s kp 3981, ki 1073, kd 409 (of the log)" in notes
     assert "above level: 345." in notes
@@ -215,7 +222,8 @@ def test_a_difference_is_named_measured_and_marked_where_it_is(client: TestClien
 def test_other_gains_than_flown_are_noticed_and_the_flown_ones_offered(client: TestClient) -> None:
     data = data_of(Flight(DEFAULT))
     part = part_of(send(client, "flight.data", data, gains="300,13,82"))
-    assert (part["agrees"], part["gains_from"], part["better_gains"]) == (False, "given", DEFAULT)
+    assert (part["agrees"], part["better_gains"]) == (False, DEFAULT)
+    assert part["facts"][0]["values"][1].endswith(", given")
     assert "The replica differs" in part["answer"]
     assert "More commands match with kp 283, ki 13, kd 82: were other gains flown?" in part["notes"]
     assert part_of(send(client, "flight.data", data, gains="283,13,82"))["agrees"] is True
@@ -225,10 +233,10 @@ def test_a_calm_flight_asks_for_its_gains(client: TestClient) -> None:
     lines = data_of(Flight(DEFAULT)).splitlines()
     calm = "\n".join(line for line in lines if float(line.split()[0]) > 40.0)
     refused = send(client, "calm.data", calm)
-    assert (refused.status_code, problems_of(refused)) == (422, {"gains": "are needed"})
-    assert "on the command line: --gains KP,KI,KD" in refused.json()["hint"]
+    assert refused.json()["texts"]["replica"]["reasons"] == ["gains are needed."]
+    assert "on the command line: --gains KP,KI,KD" in refused.json()["texts"]["replica"]["notes"][0]
     refused = send(client, "calm.data", calm, gains="1,2")
-    assert problems_of(refused) == {"gains": "must be three whole numbers, KP,KI,KD"}
+    assert refused.json()["texts"]["replica"]["reasons"] == ["gains must be three whole numbers, KP,KI,KD."]
     part = part_of(send(client, "calm.data", calm, gains="283,13,82"))
     assert part["agrees"] is True
     assert any("not simulated" in note for note in part["notes"])
@@ -236,10 +244,15 @@ def test_a_calm_flight_asks_for_its_gains(client: TestClient) -> None:
     assert [figure["title"] for figure in part["figures"]] == ["Commands"]
 
 
+def test_a_log_without_the_loop_is_refused_by_what_it_lacks(client: TestClient) -> None:
+    found = send(client, "alive.data", b"1.0 31 ALIVE 1\n").json()
+    assert found["tuning"]["grade"] == "refused"
+    assert "contains neither VERT_LOOP" in found["texts"]["tuning"]["reasons"][0]
+
+
 @pytest.mark.parametrize(
     ("name", "content", "field", "reason"),
     [
-        ("alive.data", b"1.0 31 ALIVE 1\n", "file", "contains neither VERT_LOOP"),
         ("cut.csv.gz", TRACES[0].read_bytes()[:5000], "file", "is damaged"),
         ("noise.csv.gz", b"\x1f\x8b" + bytes(range(200)), "file", "is compressed (gzip)"),
         ("text.csv.gz", gzip.compress(b"a,b\n1,2\n", mtime=0), "file", "is compressed (gzip)"),
@@ -269,4 +282,4 @@ def test_a_small_file_that_unpacks_to_a_huge_one_is_refused(client: TestClient) 
 def test_the_example_shows_what_the_replica_is(client: TestClient) -> None:
     found = get(client, f"{PATH}/example")
     assert found["file_name"] == "takeoff_default.csv.gz"
-    assert "all 8\N{NARROW NO-BREAK SPACE}192 steps are exact in all 7 signals" in found["replica"]["answer"]
+    assert "all 8\N{NARROW NO-BREAK SPACE}192 steps are exact in all 7 signals" in found["texts"]["replica"]["answer"]

@@ -19,6 +19,7 @@ from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.logs.recorded import recorded
 from tests.logs.written import (
     ARMED,
+    AUTO,
     DISARMED,
     GUIDED,
     LAND,
@@ -28,6 +29,7 @@ from tests.logs.written import (
     NOT_LANDED,
     PARAMETERS,
     PSCD,
+    RTL,
     STABILIZE,
     VIBRATION_FAILSAFE,
     ardupilot_log,
@@ -49,10 +51,10 @@ def loop_of(flight: LoggedFlight) -> ArduPilotLoop:
 
 
 def refusal(content: bytes) -> tuple[str, str]:
-    with pytest.raises(TrajectoryError) as refused:
+    with pytest.raises(InputError) as refused:
         read(content)
     (problem,) = refused.value.problems
-    return problem.field, problem.reason
+    return problem.field, problem.code
 
 
 def spans_s(flight: LoggedFlight) -> list[tuple[float, float]]:
@@ -91,21 +93,18 @@ def test_parameters_of_release_4_7_are_read_by_their_new_names_and_units() -> No
 
 def test_every_mode_that_holds_altitude_counts_and_landing_does_not() -> None:
     log = ardupilot_log(
-        gusty(), modes=((0.0, LOITER), (15.0, GUIDED), (22.0, LAND)), events=((0.0, NOT_LANDED), (26.0, LANDED))
+        gusty(), modes=((0.0, LOITER), (15.0, GUIDED), (22.0, LAND)), events=((0.0, NOT_LANDED), (60.0, LANDED))
     )
     assert spans_s(read(log)) == [(10.0, 21.9)]
 
 
 def test_the_seconds_around_takeoff_and_landing_are_left_out() -> None:
-    log = ardupilot_log(gusty(), events=((11.0, NOT_LANDED), (26.0, LANDED)))
-    assert spans_s(read(log)) == [(13.0, 22.9)]
+    log = ardupilot_log(gusty(), events=((11.0, NOT_LANDED), (20.5, LANDED)))
+    assert spans_s(read(log)) == [(13.0, 17.4)]
 
 
 def test_a_manual_mode_is_refused() -> None:
-    assert refusal(ardupilot_log(gusty(), modes=((0.0, STABILIZE),))) == (
-        "MODE",
-        "has no mode that holds altitude in flight",
-    )
+    assert refusal(ardupilot_log(gusty(), modes=((0.0, STABILIZE),))) == ("MODE", "altitude_not_held")
 
 
 def test_a_log_that_never_left_the_ground_is_refused() -> None:
@@ -115,7 +114,7 @@ def test_a_log_that_never_left_the_ground_is_refused() -> None:
         ardupilot_log(standing(), events=()),
         ardupilot_log(without_thrust, events=()),
     ):
-        assert refusal(log) == ("EV", "has no takeoff, or nothing between takeoff and landing")
+        assert refusal(log) == ("EV", "never_flew")
 
 
 @pytest.mark.parametrize(
@@ -133,6 +132,98 @@ def test_a_log_that_begins_in_the_air_is_read_by_altitude_until_an_event_tells(
     events: tuple[tuple[float, int], ...], flown_s: tuple[float, float]
 ) -> None:
     assert spans_s(read(ardupilot_log(gusty(), events=events)))[-1] == flown_s
+
+
+def test_filters_that_leave_nothing_together_tell_the_seconds_that_each_takes() -> None:
+    """17 s in the air: 3 s in STABILIZE, leaning in 10 s, and 4 s with a reset of the altitude in the middle."""
+    lean = [(0.2 * step, 40.0 if 14.0 < 0.2 * step < 24.0 else 0.0, 0.0) for step in range(200)]
+    log = ardupilot_log(moved("z_m", 2.0, 1.0), modes=((0.0, GUIDED), (24.0, STABILIZE)), attitude=lean)
+    with pytest.raises(TrajectoryError) as refused:
+        read(log)
+    (problem,) = refused.value.problems
+    assert (problem.field, problem.code) == ("ATT", "leans")
+    assert problem.numbers == pytest.approx(
+        {
+            "flown_s": 16.9,
+            "held_s": 14.0,
+            "left_out_by_altitude_not_held_s": 2.9,
+            "left_out_by_leans_s": 12.0,
+            "left_out_by_resets_s": 2.0,
+            "needed_s": 4.0,
+        },
+        abs=0.21,
+    )
+    assert "left out: 2.9 s (altitude not held), " in problem.reason
+
+
+def landing(flight: LoggedFlight, *, detected_s: float) -> LoggedFlight:
+    """The flight with a descent to the ground at its end, 0.7 m/s, a hard contact, and rest until it is detected."""
+    (segment,) = flight.segments
+    fall_s, step_s = 5.0 / 0.7, 0.1
+    more = np.arange(1, round((fall_s + detected_s + 2.0) / step_s)) * step_s
+    falls = more < fall_s
+    height = np.maximum(5.0 - 0.7 * more, 0.0)
+    tail = {
+        "time_s": segment.time_s[-1] + more,
+        "z_m": height,
+        "z_d_m": 5.0 - 0.7 * more,
+        "v_m_s": np.where(falls, -0.7, 0.0),
+        "v_d_m_s": np.full_like(more, -0.7),
+        "v_t_m_s": np.full_like(more, -0.7),
+        "a_m_s2": np.where(falls, 0.0, 9.0 * np.sin(30.0 * more)),
+        "a_d_m_s2": np.zeros_like(more),
+        "throttle": np.where(falls, 0.39, 0.2),
+        "throttle_filtered": np.where(falls, 0.39, 0.2),
+        "assumed_hover": np.full_like(more, 0.4),
+    }
+    joined = {name: np.append(getattr(segment, name), tail[name]) for name in tail}
+    return replace(flight, segments=[replace(segment, **joined)])
+
+
+@pytest.mark.parametrize("mode", [RTL, AUTO, LOITER, GUIDED, LAND])
+@pytest.mark.parametrize("detected_s", [0.5, 4.0])
+def test_a_landing_is_left_out_in_every_mode(mode: int, detected_s: float) -> None:
+    """From 27 s on it descends from 5 m, and touches down at 34.1 s, which is reported late."""
+    at_s = 27.0 + 5.0 / 0.7 + detected_s
+    log = ardupilot_log(
+        landing(gusty(), detected_s=detected_s),
+        modes=((0.0, GUIDED), (27.0, mode)),
+        events=((0.0, NOT_LANDED), (at_s, LANDED)),
+    )
+    ((begin_s, end_s),) = spans_s(read(log))
+    assert begin_s == 10.0
+    assert end_s == pytest.approx(26.9, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "frame"),
+    [
+        ({"FRAME_CLASS": 6.0}, "helicopter"),
+        ({"FRAME_CLASS": 11.0}, "helicopter"),
+        ({"FRAME_CLASS": 13.0}, "helicopter"),
+        ({"H_SW_TYPE": 3.0}, "helicopter"),
+        ({"Q_ENABLE": 1.0}, "VTOL"),
+    ],
+)
+def test_another_kind_of_vehicle_is_known_by_its_parameters(parameters: dict[str, float], frame: str) -> None:
+    with pytest.raises(TrajectoryError) as refused:
+        read(ardupilot_log(gusty(), parameters={**PARAMETERS, **parameters}))
+    (problem,) = refused.value.problems
+    assert (problem.code, [*problem.named]) == ("not_a_copter", [frame])
+
+
+def test_a_copter_whose_log_could_hold_a_helicopters_messages_is_read() -> None:
+    parameters = {**PARAMETERS, "FRAME_CLASS": 1.0, "Q_ENABLE": 0.0}
+    assert spans_s(read(ardupilot_log(gusty(), parameters=parameters))) == [(10.0, 26.9)]
+
+
+def test_a_throttle_hardly_below_zero_is_none() -> None:
+    (segment,) = gusty().segments
+    throttle = segment.throttle_filtered.copy()
+    throttle[90:93] = -4e-7
+    (found,) = read(ardupilot_log(changed(throttle_filtered=throttle))).segments
+    assert len(found.time_s) == len(segment.time_s)
+    assert found.throttle_filtered.min() == 0.0
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
@@ -188,8 +279,7 @@ def test_an_older_release_without_the_shaped_altitude_is_read_by_its_target() ->
 
 def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_named() -> None:
     log = ardupilot_log(gusty())
-    assert "PSCZ of an older release" in refusal(log.replace(b"PSCD", b"PSCZ"))[1]
-    assert refusal(log.replace(b",TVD", b",XVD")) == ("PSCD.TVD", "is missing: this release is not supported")
+    assert refusal(log.replace(b",TVD", b",XVD")) == ("PSCD.TVD", "column_missing")
     assert refusal(log.replace(b",DPD,TPD", b",XPD,YPD"))[0] == "PSCD.DPD"
 
 
@@ -316,15 +406,20 @@ def test_another_thrust_curve_ends_a_part() -> None:
 
 
 @pytest.mark.parametrize(
-    ("message", "reason"),
+    ("parameters", "code"),
     [
-        (b"PSCD", "is missing: add NTUN to LOG_BITMASK, and fly again"),
-        (b"CTUN", "is missing: add CTUN to LOG_BITMASK, and fly again"),
+        ({"LOG_BITMASK": 176126.0}, "message_missing"),
+        ({}, "message_missing"),
+        ({"LOG_BITMASK": 2.0}, "log_bit_unset"),
+        ({"LOG_BITMASK": 2.0, "POS_Z_P": 1.0}, "message_missing"),
     ],
 )
-def test_a_missing_message_is_named_with_what_to_switch_on(message: bytes, reason: str) -> None:
-    content = ardupilot_log(gusty()).replace(message, b"X" + message[1:])
-    assert refusal(content) == (message.decode(), reason)
+@pytest.mark.parametrize("message", [b"PSCD", b"CTUN"])
+def test_a_bit_is_to_be_set_only_if_it_is_not_and_would_help(
+    message: bytes, parameters: dict[str, float], code: str
+) -> None:
+    content = ardupilot_log(gusty(), parameters={**PARAMETERS, **parameters})
+    assert refusal(content.replace(message, b"X" + message[1:])) == (message.decode(), code)
 
 
 @pytest.mark.parametrize(
@@ -338,9 +433,11 @@ def test_a_missing_message_is_named_with_what_to_switch_on(message: bytes, reaso
 )
 def test_a_log_without_a_gain_or_with_none_of_it_is_refused(gain: str, newer: str) -> None:
     without = {name: value for name, value in PARAMETERS.items() if name != gain}
-    refused = refusal(ardupilot_log(gusty(), parameters=without))
-    assert refused == (gain, f"is missing, and {newer} of release 4.7 too")
-    assert refusal(ardupilot_log(gusty(), parameters={**PARAMETERS, gain: 0.0})) == (gain, "must be positive, got 0")
+    with pytest.raises(TrajectoryError, match=newer):
+        read(ardupilot_log(gusty(), parameters=without))
+    assert refusal(ardupilot_log(gusty(), parameters=without)) == (gain, "parameter_missing")
+    none = ardupilot_log(gusty(), parameters={**PARAMETERS, gain: 0.0})
+    assert refusal(none) == (gain, "parameter_not_positive")
 
 
 def test_a_log_without_parameters_is_refused() -> None:
@@ -356,15 +453,15 @@ def test_a_limit_that_the_replica_lacks_is_named() -> None:
 def test_a_loop_rate_that_cannot_be_is_refused() -> None:
     assert refusal(ardupilot_log(gusty(), parameters={**PARAMETERS, "SCHED_LOOP_RATE": 1e9})) == (
         "SCHED_LOOP_RATE",
-        "must be 50 to 2000 Hz, got 1e+09",
+        "parameter_out_of_range",
     )
 
 
 def test_rows_that_are_rare_or_not_numbers_are_refused() -> None:
-    assert refusal(ardupilot_log(gusty(), rows=slice(0, None, 4)))[0] == "PSCD"
+    assert refusal(ardupilot_log(gusty(), rows=slice(0, None, 4))) == ("PSCD", "gaps")
     flight = simulated_flight(GUSTY)
     flight.segments[0].v_m_s[:] = np.nan
-    assert refusal(ardupilot_log(flight))[0] == "PSCD"
+    assert refusal(ardupilot_log(flight)) == ("PSCD", "not_numbers")
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.7])
@@ -372,6 +469,6 @@ def test_a_log_that_was_cut_off_is_read_as_far_as_it_goes_or_refused(share: floa
     whole = ardupilot_log(gusty())
     content = whole[: round(share * len(whole))]
     if share < 0.5:
-        assert refusal(content)[0] == "PSCD"
+        assert refusal(content) == ("file", "too_short")
     else:
         assert spans_s(read(content))[0][0] == 10.0

@@ -21,7 +21,7 @@ from app.core.errors import InputError, TrajectoryError
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.recorded import recorded
 from tests.logs.written_px4 import FLIGHT as IN_FLIGHT
-from tests.logs.written_px4 import HOLD, LAND, MISSION, PARAMETERS, POSITION, RAMP_UP, READY, TAKEOFF, px4_log
+from tests.logs.written_px4 import HOLD, LAND, MISSION, PARAMETERS, POSITION, RAMP_UP, READY, RETURN, TAKEOFF, px4_log
 
 
 @cache
@@ -62,7 +62,7 @@ def refusal(content: bytes) -> tuple[str, str]:
         read(content)
     (problem,) = refused.value.problems
     assert "SDLOG_PROFILE" in refused.value.hint
-    return problem.field, problem.reason
+    return problem.field, problem.code
 
 
 def without_parameter(name: str) -> dict[str, float]:
@@ -91,60 +91,55 @@ def test_steps_of_offboard_control_have_no_rates() -> None:
 
 
 def test_of_the_recorded_takeoff_nothing_is_left() -> None:
-    field, reason = refusal(recorded("px4_takeoff.ulg"))
-    assert field == "vehicle_local_position_setpoint"
-    assert reason.startswith("has no 4 s with an altitude to follow between takeoff and landing")
+    assert refusal(recorded("px4_takeoff.ulg")) == ("vehicle_status", "only_takeoffs_or_landings")
 
 
 @pytest.mark.parametrize(
-    ("options", "field", "reason"),
+    ("options", "field", "code"),
     [
-        ({"without": ["vehicle_local_position"]}, "vehicle_local_position", "is missing: set bit 0 of SDLOG_PROFILE"),
-        ({"without": ["trajectory_setpoint"]}, "trajectory_setpoint", "is missing: set bit 0 of SDLOG_PROFILE"),
-        ({"without": ["takeoff_status"]}, "takeoff_status", "is missing: set bit 0 of SDLOG_PROFILE"),
-        ({"without": ["vehicle_status"]}, "vehicle_status", "is missing: set bit 0 of SDLOG_PROFILE"),
+        ({"without": ["vehicle_local_position"]}, "vehicle_local_position", "message_missing"),
+        ({"without": ["trajectory_setpoint"]}, "trajectory_setpoint", "message_missing"),
+        ({"without": ["takeoff_status"]}, "takeoff_status", "message_missing"),
+        ({"without": ["vehicle_status"]}, "vehicle_status", "message_missing"),
         (
             {"renamed": ("float[3] thrust;", "float[3] xhrust;")},
             "vehicle_local_position_setpoint.thrust[2]",
-            "is missing: this release is not supported",
+            "column_missing",
         ),
-        ({"takeoff": ((0.0, READY), (1.0, RAMP_UP))}, "takeoff_status", "never reports a flight"),
-        ({"landed": ((0.0, True),)}, "takeoff_status", "never reports a flight"),
-        ({"modes": ((0.0, TAKEOFF), (8.0, LAND))}, "vehicle_status", "has no mode in flight but takeoffs and landings"),
+        ({"takeoff": ((0.0, READY), (1.0, RAMP_UP))}, "takeoff_status", "never_flew"),
+        ({"landed": ((0.0, True),)}, "takeoff_status", "never_flew"),
+        ({"modes": ((0.0, TAKEOFF), (8.0, LAND))}, "vehicle_status", "only_takeoffs_or_landings"),
         (
             {"has_altitude": False, "modes": ((0.0, POSITION),)},
             "vehicle_local_position_setpoint.z",
-            "has no altitude to follow in flight, as in manual modes",
+            "manual_altitude",
         ),
-        ({"tilt": 0.7}, "vehicle_local_position_setpoint.thrust", "leans by more than 30°"),
+        ({"tilt": 0.7}, "vehicle_local_position_setpoint.thrust", "leans"),
         (
             {"modes": ((0.0, TAKEOFF), (3.0, HOLD), (5.0, LAND))},
-            "vehicle_local_position_setpoint",
-            "has no 4 s with an altitude to follow",
+            "vehicle_status",
+            "only_takeoffs_or_landings",
         ),
-        ({"parameters": without_parameter("MPC_Z_VEL_D_ACC")}, "MPC_Z_VEL_D_ACC", "is missing"),
-        ({"parameters": {**PARAMETERS, "MPC_Z_P": 0.0}}, "MPC_Z_P", "must be positive, got 0"),
+        ({"parameters": without_parameter("MPC_Z_VEL_D_ACC")}, "MPC_Z_VEL_D_ACC", "parameter_missing"),
+        ({"parameters": {**PARAMETERS, "MPC_Z_P": 0.0}}, "MPC_Z_P", "parameter_not_positive"),
     ],
 )  # fmt: skip
 def test_a_log_that_cannot_be_used_is_refused_by_what_is_missing(
-    options: dict[str, Any], field: str, reason: str
+    options: dict[str, Any], field: str, code: str
 ) -> None:
-    found = refusal(px4_log(flown(), **options))
-    assert (found[0], found[1][: len(reason)]) == (field, reason)
+    assert refusal(px4_log(flown(), **options)) == (field, code)
 
 
 def test_a_log_with_a_single_row_is_refused() -> None:
     first = replace(logged(), **{name: getattr(logged(), name)[:1] for name in Segment.__slots__})
-    assert refusal(px4_log(replace(flown(), segments=[first])))[0] in {
-        "vehicle_local_position_setpoint", "vehicle_local_position_setpoint.z"
-    }  # fmt: skip
+    assert refusal(px4_log(replace(flown(), segments=[first])))[1] in {"never_flew", "manual_altitude"}
 
 
 def test_thrust_without_numbers_is_refused() -> None:
     unknown = replace(logged(), throttle=np.full_like(logged().throttle, np.nan))
     assert refusal(px4_log(replace(flown(), segments=[unknown]))) == (
         "vehicle_local_position_setpoint",
-        "has no rows of numbers beside positions",
+        "not_numbers",
     )
 
 
@@ -158,9 +153,73 @@ def test_takeoff_and_landing_are_left_out() -> None:
     assert spans_s(read(log)) == [(3.1, 20.0)]
 
 
+@pytest.mark.parametrize("mode", [RETURN, MISSION, HOLD, LAND])
+@pytest.mark.parametrize("detected_s", [0.5, 4.0])
+def test_a_landing_is_left_out_in_every_mode(mode: int, detected_s: float) -> None:
+    """From 24 s on it descends from its last altitude, and the land detector is late."""
+    segment = logged()
+    fall_s = float(segment.z_m[-1]) / 0.7
+    more = np.arange(0.096, fall_s + detected_s + 2.0, 0.096)
+    falls, down_m = more < fall_s, float(segment.z_m[-1]) - 0.7 * more
+    tail = {
+        "time_s": segment.time_s[-1] + more,
+        "z_m": np.maximum(down_m, 0.0),
+        "z_d_m": down_m,
+        "throttle": np.where(falls, 0.38, 0.1),
+        "throttle_filtered": np.where(falls, 0.38, 0.1),
+        "assumed_hover": np.full_like(more, 0.4),
+        "a_m_s2": np.zeros_like(more),
+        "a_d_m_s2": np.zeros_like(more),
+        "v_m_s": np.where(falls, -0.7, 0.0),
+        "v_d_m_s": np.full_like(more, -0.7),
+        "v_t_m_s": np.full_like(more, -0.7),
+    }
+    joined = replace(segment, **{name: np.append(getattr(segment, name), tail[name]) for name in tail})
+    log = px4_log(
+        replace(flown(), segments=[joined]),
+        modes=((0.0, HOLD), (24.0, mode)),
+        landed=((0.0, False), (24.0 + fall_s + detected_s, True)),
+    )
+    ((begin_s, end_s),) = spans_s(read(log))
+    assert begin_s == 0.0
+    assert end_s == pytest.approx(23.9, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("options", "frame"),
+    [
+        ({"kind": 2}, "plane"),
+        ({"kind": 3}, "rover"),
+        ({"parameters": {**PARAMETERS, "CA_AIRFRAME": 2}}, "VTOL"),
+        ({"parameters": {**PARAMETERS, "CA_AIRFRAME": 10}}, "helicopter"),
+        ({"parameters": {**PARAMETERS, "MAV_TYPE": 22}}, "VTOL"),
+        ({"parameters": {**PARAMETERS, "SYS_AUTOSTART": 13000}}, "VTOL"),
+    ],
+)
+def test_another_kind_of_vehicle_is_refused(options: dict[str, Any], frame: str) -> None:
+    """Most report rotors in their status."""
+    with pytest.raises(TrajectoryError) as refused:
+        read(px4_log(flown(), **options))
+    (problem,) = refused.value.problems
+    assert (problem.code, [*problem.named]) == ("not_a_copter", [frame])
+
+
+def test_a_copter_by_its_airframe_is_read() -> None:
+    parameters = {**PARAMETERS, "CA_AIRFRAME": 0, "MAV_TYPE": 2, "SYS_AUTOSTART": 4001}
+    assert spans_s(read(px4_log(flown(), parameters=parameters))) == spans_s(read(whole()))
+
+
+def test_a_thrust_hardly_below_zero_is_none() -> None:
+    thrust = logged().throttle.copy()
+    thrust[100:103] = -4e-7
+    flight = read(px4_log(replace(flown(), segments=[replace(logged(), throttle=thrust)])))
+    assert spans_s(flight) == spans_s(read(whole()))
+    assert flight.segments[0].throttle.min() == 0.0
+
+
 def test_the_ramp_of_a_takeoff_and_the_ground_are_left_out() -> None:
-    log = px4_log(flown(), takeoff=((0.0, RAMP_UP), (2.0, IN_FLIGHT)), landed=((0.0, False), (21.0, True)))
-    assert spans_s(read(log)) == [(2.0, 20.9)]
+    log = px4_log(flown(), takeoff=((0.0, RAMP_UP), (2.0, IN_FLIGHT)), landed=((0.0, False), (40.0, True)))
+    assert spans_s(read(log)) == [(2.0, 23.9)]
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
@@ -211,8 +270,8 @@ def test_the_limits_are_the_parameters_where_they_were_not_logged() -> None:
 
 def test_a_file_that_was_cut_off_says_so_where_it_does_not_suffice() -> None:
     content = px4_log(flown())
-    _, reason = refusal(content[: len(content) // 8 - 7])
-    assert reason.endswith("; the file ends in the middle of a message")
+    with pytest.raises(TrajectoryError, match="; the file ends in the middle of a message"):
+        read(content[: len(content) // 8 - 7])
 
 
 @given(st.data())

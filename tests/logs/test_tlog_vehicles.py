@@ -17,6 +17,7 @@ from app.autopilots.takeoffs import Takeoff
 from app.autopilots.tlog import read_tlog
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import TrajectoryError
+from app.core.reasons import OTHER_FRAMES
 from app.log_analyses.content import analyze_content
 from app.logs.base import HEAD_BYTES
 from app.logs.formats import Format, recognise
@@ -222,9 +223,11 @@ def test_the_vehicle_with_the_most_to_learn_is_analysed_whichever_reports_most(f
 @pytest.mark.complete
 def test_the_analysis_says_that_there_was_another_and_takes_it_on_request(fleet: bytes) -> None:
     answer, _ = analyze_content(fleet, None, "flight.tlog")
-    assert "Another vehicle in the log, system 9 under ArduPilot." in getattr(answer.tuning, "notes", ())
-    with pytest.raises(TrajectoryError, match=r"only in LOITER.*another vehicle in the log, system 1 under ArduPilot"):
-        analyze_content(fleet, None, "flight.tlog", vehicle=9)
+    assert answer.texts.tuning.notes.count("Another vehicle in the log, system 9 under ArduPilot.") == 1
+    other, _ = analyze_content(fleet, None, "flight.tlog", vehicle=9)
+    assert "other_modes" in [each.code for each in other.tuning.reasons]
+    said = " ".join((*other.texts.tuning.reasons, *other.texts.tuning.notes))
+    assert said.casefold().count("another vehicle in the log, system 1 under ardupilot") == 1
 
 
 def recording_of(content: bytes) -> Recording:
@@ -346,7 +349,7 @@ def test_a_takeoff_with_too_few_samples_is_refused_with_their_number() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "frame"),
-    [(1, "fixed-wing"), (4, "helicopter"), (10, "rover"), (20, "VTOL"), (22, "VTOL"), (5, "tracker"), (8, "type 8")],
+    [(1, "plane"), (4, "helicopter"), (10, "rover"), (20, "VTOL"), (22, "VTOL"), (5, "tracker"), (8, "other")],
 )
 def test_what_is_no_copter_is_named_by_its_heartbeats(kind: int, frame: str) -> None:
     """The first one, before the frame is configured, says nothing."""
@@ -354,7 +357,8 @@ def test_what_is_no_copter_is_named_by_its_heartbeats(kind: int, frame: str) -> 
     for each in (0, kind, kind):
         log.vehicle("heartbeat", each, 3, 0, 0, 4)
         log.fly(1.0, to_m=0.0)
-    assert frame in recording_of(log.content).frame
+    assert recording_of(log.content).frame == frame
+    assert frame in OTHER_FRAMES
     log = Telemetry(ardupilotmega, autopilot=3, system=1)
     log.heartbeat()
     log.fly(1.0, to_m=0.0)

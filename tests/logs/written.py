@@ -8,7 +8,7 @@ from app.core.records.trajectory import Samples
 from tests.logs.recorded import OnBoardLog
 
 PARM, MODE, EV, PSCD, CTUN, ATT, ERR = 1, 2, 3, 4, 5, 6, 7
-GUIDED, LOITER, LAND, STABILIZE = 4, 5, 9, 0
+GUIDED, LOITER, LAND, STABILIZE, AUTO, RTL = 4, 5, 9, 0, 3, 6
 NOT_LANDED, LANDED, ARMED, DISARMED = 28, 18, 10, 11
 VIBRATION_FAILSAFE = 29
 

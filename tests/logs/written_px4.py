@@ -7,7 +7,7 @@ from app.autopilots.px4.replica.vertical import GRAVITY
 from app.core.analysis.loop import LoggedFlight
 from tests.logs.recorded import ULogFile
 
-HOLD, MISSION, TAKEOFF, LAND, OFFBOARD, POSITION = 4, 3, 17, 18, 14, 2
+HOLD, MISSION, TAKEOFF, LAND, OFFBOARD, POSITION, RETURN = 4, 3, 17, 18, 14, 2, 5
 READY, RAMP_UP, FLIGHT = 3, 4, 5
 
 PARAMETERS: Final[Mapping[str, float]] = {

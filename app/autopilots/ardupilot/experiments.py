@@ -51,6 +51,7 @@ from app.core.models.copter import (
 )
 from app.core.models.set_points import SetPoints
 from app.core.policy import PolicySpace, Vector
+from app.core.reasons import Reason, ReasonCode
 from app.core.records.trajectory import Samples, Trajectory
 
 GAINS: Final = (
@@ -108,7 +109,6 @@ class ArduPilotLoop(CopterLoop):
             "5 s, climb 2 m, hover for 5 s, descend 2 m, hover for 5 s; with NTUN and CTUN in LOG_BITMASK."
         ),
         lags="motors, accelerometer filter, acceleration controller filters",
-        other_controller="terrain following, or a release with another position controller",
         parameter_suffix=".param",
     )
     space = GainSpace(
@@ -294,11 +294,8 @@ def _on_time(loop: ArduPilotLoop, trajectory: Trajectory, steps: FlownSteps) -> 
             time_s = min((time_s + lateness_s).tolist(), key=misfit)
         found, misfit_m = _with_time(found, place, time_s), max(misfit_m, misfit(time_s))
     if misfit_m > _LARGEST_MISFIT_M:
-        raise unanswered(
-            "reference_m",
-            f"differs by {misfit_m:.2f} m from the target that ArduCopter shapes from the set points with the "
-            "vehicle's parameters",
-        )
+        numbers = {"misfit_m": misfit_m}
+        raise unanswered(Reason(code=ReasonCode.REFERENCE_NOT_SHAPED, field="reference_m", numbers=numbers))
     return found
 
 

@@ -1,7 +1,8 @@
 """A whole flight's altitude control in ArduPilot's on-board log (.bin), in every mode that holds altitude."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -15,25 +16,32 @@ from app.autopilots.ardupilot.replica.parameters import (
     LOOP_RATE,
     LOOP_RATE_HZ,
     LOOP_RATES_HZ,
+    NEWER_NAMES,
     in_newer_names,
     parameters_from,
 )
-from app.autopilots.recording import LONGEST_INTERVAL_S, EventKind, Recording, Refused, Rows, refusal
+from app.autopilots.recording import EventKind, Recording, Rows
 from app.autopilots.segments import (
     LARGEST_LEAN,
-    SHORTEST_PART_S,
+    Condition,
+    Refused,
     choose_parts,
+    find_landings,
+    has_neighbour,
     jumps,
     thinned,
+    within_limits,
 )
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
+from app.core.control.parameter_checks import require_within
+from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples
 
 _TUNING: Final = ("demanded_throttle", "thrust", "hover_throttle")
 _ONE_OF_TWO: Final = (["desired_altitude_m"], ["reference_m"])
 """Columns without which the other one is the reference."""
-_HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
+HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
 """ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
@@ -46,6 +54,21 @@ _LARGEST_ACCELERATION_M_S2: Final = 50.0
 _LEARNED: Final = "MOT_THST_HOVER"
 _THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX")
 _USED: Final = frozenset({*LOOP_NAMES, *_THRUST_CURVE} - {_LEARNED})
+_HELICOPTERS: Final = (6.0, 11.0, 13.0)
+"""FRAME_CLASS of helicopters with one rotor, two and four."""
+_FIRMWARES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "AntennaTracker": "tracker",
+        "ArduPlane": "plane",
+        "ArduRover": "rover",
+        "ArduSub": "submarine",
+        "Blimp": "airship",
+        "Rover": "rover",
+    }
+)
+_UNTIL_4_0: Final = frozenset({"THR_ALT_P", "POS_Z_P", "PSC_ACC_XY_FILT"})
+"""Parameters of releases that do not log this loop, whatever their LOG_BITMASK."""
+_LOG_BITS: Final[Mapping[str, int]] = MappingProxyType({"CTUN": 1 << 4, "NTUN": 1 << 5})
 
 
 def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
@@ -53,62 +76,49 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.
     """
-    refused = refusal(
-        f"{name} cannot be analysed.",
-        "Use ArduCopter's .bin log of a flight with altitude changes, with NTUN and CTUN in LOG_BITMASK.",
-    )
+    refused = _refused(recording, name)
     _require_messages(recording, refused)
     time_s = recording.columns["altitude_m"].time_s
-    lean, throttle = _lean(recording, time_s), [recording.columns[each].beside(time_s) for each in _TUNING]
+    lean = _lean(recording, time_s)
+    throttle = [within_limits(recording.columns[each].beside(time_s)) for each in _TUNING]
     rows = _rows(recording, lean, throttle)
-    motion = (rows.z_d_m, rows.z_m, rows.v_m_s, rows.a_m_s2, rows.v_d_m_s, rows.a_d_m_s2, rows.v_t_m_s)
-    is_sound = np.isfinite(np.sum(motion, axis=0))
-    is_sound &= np.abs(rows.a_m_s2) <= _LARGEST_ACCELERATION_M_S2
-    is_sound &= np.all([(each >= 0.0) & (each <= 1.0) for each in throttle], axis=0)
-    conditions = (
-        (is_sound, "PSCD", "has no rows of numbers beside rows of CTUN"),
-        (_in_flight(recording, time_s), "EV", "has no takeoff, or nothing between takeoff and landing"),
-        (
-            np.isin(recording.at("mode", time_s), _HOLDS_ALTITUDE),
-            "MODE",
-            "has no mode that holds altitude in flight",
-        ),
-        (
-            np.nan_to_num(recording.at("vibration_failsafe", time_s)) == 0.0,
-            "ERR",
-            "has vibration compensation active throughout the flight",
-        ),
-        (lean >= LARGEST_LEAN, "ATT", "leans by more than 30° throughout the flight"),
-    )
-    none_found = (
-        f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} "
-        "s, a jump in altitude or a parameter change"
-    )
+    motion = (rows.z_d_m, rows.z_m, rows.v_m_s, rows.a_m_s2, rows.v_d_m_s, rows.a_d_m_s2, rows.v_t_m_s, *throttle)
+    is_sound = np.isfinite(np.sum(motion, axis=0)) & (np.abs(rows.a_m_s2) <= _LARGEST_ACCELERATION_M_S2)
+    is_calm = np.nan_to_num(recording.at("vibration_failsafe", time_s)) == 0.0
     given, chosen = choose_parts(
         time_s,
-        conditions,
+        (
+            Condition(_in_flight(recording, time_s), ReasonCode.NEVER_FLEW, "EV"),
+            Condition(_holds_altitude(recording, time_s), ReasonCode.ALTITUDE_NOT_HELD, "MODE"),
+            Condition(~_landings(recording, time_s), ReasonCode.ONLY_TAKEOFFS_OR_LANDINGS, "EV"),
+            Condition(is_calm, ReasonCode.VIBRATION_FAILSAFE, "ERR"),
+            Condition(has_neighbour(time_s), ReasonCode.GAPS, "PSCD"),
+            Condition(is_sound, ReasonCode.NOT_NUMBERS, "PSCD"),
+            Condition(lean >= LARGEST_LEAN, ReasonCode.LEANS, "ATT"),
+        ),
         _is_reset(rows),
         history(recording, _USED),
         rows.a_d_m_s2,
         refused,
-        ("PSCD", none_found),
         ArduPilotLoop.space.bounds,
-        lambda gain: f"is missing, and {next(iter(in_newer_names({gain: 0.0})))} of release 4.7 too",
+        lambda gain: Reason(code=ReasonCode.PARAMETER_MISSING, field=gain, named=[*in_newer_names({gain: 0.0})]),
     )
+    require_within(given, {LOOP_RATE: LOOP_RATES_HZ})
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
-    rate_hz = given.get(LOOP_RATE, LOOP_RATE_HZ)
-    if not LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1]:
-        raise refused(LOOP_RATE, f"must be {LOOP_RATES_HZ[0]:g} to {LOOP_RATES_HZ[1]:g} Hz, got {rate_hz:g}")
-    newer = in_newer_names(dict.fromkeys(ArduPilotLoop.space.bounds, 0.0)).keys()
     return LoggedFlight(
         loop=ArduPilotLoop(
             parameters=parameters_from({**given, _LEARNED: hover}),
             filter_hz=given.get(ACCELEROMETER_FILTER, ACCELEROMETER_FILTER_HZ),
-            step_s=1.0 / rate_hz,
-            has_newer_names=any(each.name in newer for each in recording.settings),
+            step_s=1.0 / given.get(LOOP_RATE, LOOP_RATE_HZ),
+            has_newer_names=has_newer_names(recording),
         ),
         segments=[rows.part(thinned(time_s, part)) for part in chosen],
     )
+
+
+def has_newer_names(recording: Recording) -> bool:
+    """Whether the vehicle's parameters have the names of release 4.7."""
+    return any(each.name in NEWER_NAMES for each in recording.settings)
 
 
 def _rows(recording: Recording, lean: Samples, throttle: Sequence[Samples]) -> Segment:
@@ -168,18 +178,53 @@ def _in_flight(recording: Recording, time_s: Samples) -> Rows:
     return flying
 
 
+def _holds_altitude(recording: Recording, time_s: Samples) -> Rows:
+    return np.isin(recording.at("mode", time_s), HOLDS_ALTITUDE)
+
+
+def _landings(recording: Recording, time_s: Samples) -> Rows:
+    """Rows of the last descent before each touchdown."""
+    downs_s = [event.time_s for event in recording.events_of(EventKind.LANDING, EventKind.MOTORS_OFF)]
+    altitude_m = recording.columns["altitude_m"].values
+    return find_landings(time_s, altitude_m, recording.at("climb_rate_m_s", time_s), downs_s)
+
+
+def frame_of(recording: Recording) -> str:
+    """The kind of vehicle, by its parameters and firmware; empty if it is a copter with several rotors."""
+    latest = {each.name: each.value for each in recording.settings}
+    if any(name.startswith("H_") for name in latest) or latest.get("FRAME_CLASS") in _HELICOPTERS:
+        return "helicopter"
+    if latest.get("Q_ENABLE"):
+        return "VTOL"
+    return _FIRMWARES.get(recording.firmware, "")
+
+
+def _refused(recording: Recording, name: str) -> Refused:
+    hint = "Use ArduCopter's .bin log of a flight with altitude changes, with NTUN and CTUN in LOG_BITMASK."
+    return lambda reason: refusal(f"{name} cannot be analysed.", hint, [reason], recording.notes)
+
+
 def _require_messages(recording: Recording, refused: Refused) -> None:
     """Require what an analysis needs, of a copter."""
     if not recording.sources:
-        raise refused("file", "has no data: copy the whole log")
-    if recording.firmware:
-        raise refused("MSG", f"is of {recording.firmware}, not of ArduCopter")
+        raise refused(Reason(code=ReasonCode.NO_DATA))
+    if frame := frame_of(recording):
+        raise refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
     found = {column.source for column in recording.columns.values()}
     absent = [name for name, source in LOOP.items() if str(source) not in found]
     if len(absent) == len(LOOP):
-        older = "; the log has PSCZ of an older release, which is not supported" if "PSCZ" in recording.sources else ""
-        raise refused("PSCD", f"is missing: add NTUN to LOG_BITMASK, and fly again{older}")
+        raise refused(_absent(recording, "PSCD", "NTUN"))
     if absent and absent not in _ONE_OF_TWO:
-        raise refused(str(LOOP[absent[0]]), "is missing: this release is not supported")
+        raise refused(Reason(code=ReasonCode.COLUMN_MISSING, field=str(LOOP[absent[0]])))
     if not recording.columns.keys() >= set(_TUNING):
-        raise refused("CTUN", "is missing: add CTUN to LOG_BITMASK, and fly again")
+        raise refused(_absent(recording, "CTUN", "CTUN"))
+
+
+def _absent(recording: Recording, message: str, bit: str) -> Reason:
+    """Why a message has no columns: its bit of LOG_BITMASK is not set, or the release logs something else."""
+    latest = {each.name: each.value for each in recording.settings}
+    would_be_logged = "LOG_BITMASK" in latest and not latest.keys() & _UNTIL_4_0
+    if would_be_logged and not int(latest["LOG_BITMASK"]) & _LOG_BITS[bit]:
+        return Reason(code=ReasonCode.LOG_BIT_UNSET, field=message, named=[bit])
+    is_otherwise = message in recording.sources or "PSCZ" in recording.sources
+    return Reason(code=ReasonCode.COLUMN_MISSING if is_otherwise else ReasonCode.MESSAGE_MISSING, field=message)

@@ -108,7 +108,6 @@ class Px4Loop(CopterLoop):
             "SDLOG_PROFILE set, its default. In a takeoff the ramp decides, not the gains."
         ),
         lags="motors, filters of the velocity (MPC_VEL_LP, MPC_VELD_LP)",
-        other_controller="a release with another position controller, or set-points that were not logged",
         parameter_suffix=".params",
         hover_deviation=HOVER_RANGE_NAME,
     )

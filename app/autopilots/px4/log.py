@@ -67,6 +67,15 @@ SOURCES: Final[Mapping[str, Source]] = {
 """The given values are the set-points, in force until the next one; `thrust` is that of the body, logged more often
 than its target."""
 VEHICLE: Final = "MAV_SYS_ID"
+AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
+    "CA_AIRFRAME": {"plane": range(1, 2), "VTOL": range(2, 5), "rover": range(5, 7), "helicopter": range(10, 13)},
+    "MAV_TYPE": {
+        "plane": range(1, 2), "helicopter": range(4, 5), "rover": range(10, 11), "boat": range(11, 12),
+        "submarine": range(12, 13), "VTOL": range(19, 26),
+    },
+    "SYS_AUTOSTART": {"VTOL": range(13000, 14000), "plane": range(2100, 3000), "rover": range(50000, 51000)},
+}  # fmt: skip
+"""Kinds of vehicles that are no copter with several rotors, by the values of parameters."""
 
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
@@ -81,7 +90,7 @@ _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position",
 def read_px4(stream: BinaryIO) -> Recording:
     """Decode a whole log. Raises TrajectoryError if it is not a readable ULog."""
     wanted = {_COMMAND, _ANSWER, *(source.message for source in SOURCES.values())}
-    tables = read_ulog_tables(stream, topics=wanted, parameters={*LOOP_NAMES, VEHICLE})
+    tables = read_ulog_tables(stream, topics=wanted, parameters={*LOOP_NAMES, VEHICLE, *AIRFRAMES})
     columns = columns_of(tables.topics, SOURCES, clock="timestamp")
     arming = columns.get("arming_state")
     recording = Recording(

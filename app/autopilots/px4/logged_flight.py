@@ -5,36 +5,43 @@ The accelerations between two rows are the change of the estimated climb rate: s
 noisy, and most are not logged.
 """
 
+from collections.abc import Mapping
 from dataclasses import fields, replace
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.experiments import Px4Loop
-from app.autopilots.px4.log import SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
+from app.autopilots.px4.log import AIRFRAMES, SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
 from app.autopilots.px4.replica.hover_range import hover_deviation
 from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, parameters_from
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
-from app.autopilots.recording import LONGEST_INTERVAL_S, Recording, Refused, Rows, refusal
+from app.autopilots.recording import EventKind, Recording, Rows
 from app.autopilots.segments import (
     LARGEST_LEAN,
-    SHORTEST_PART_S,
+    Condition,
+    Refused,
     choose_parts,
+    find_landings,
     jumps,
     thinned,
+    within_limits,
 )
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import FinerSegment, Segment
+from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples
 
 _NEEDED: Final = (
     "altitude_m", "climb_rate_m_s", "reference_m", "climb_rate_target_m_s", "acceleration_target_m_s2", "thrust_target",
     "given_climb_rate_m_s", "given_acceleration_m_s2", "takeoff_state", "mode",
 )  # fmt: skip
-_OTHER_KINDS: Final = 2
-"""The first kind of vehicle that does not fly on rotors; a VTOL changes from one to the other."""
-_LEFT_OUT: Final = (12.0, 17.0, 18.0, 20.0)
+_ROTORS: Final = 1.0
+_KINDS: Final[Mapping[float, str]] = MappingProxyType({2: "plane", 3: "rover"})
+"""Kinds of vehicle in its status, but for those with rotors, 1."""
+LEFT_OUT_MODES: Final = (12.0, 17.0, 18.0, 20.0)
 """Modes: descend, takeoff, land, precision landing."""
 _JUMP_M: Final = 0.5
 _JUMP_M_S: Final = 2.0
@@ -51,12 +58,7 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the topic or parameter that is missing, or InputError for one not supported.
     """
-    refused = refusal(
-        f"{name} cannot be analysed.",
-        "Use PX4's .ulg log of a flight with altitude changes in Hold, Mission or Offboard mode, with bit 0 of "
-        "SDLOG_PROFILE set, its default. Takeoffs are left out: their ramp decides, not the gains.",
-        recording.notes,
-    )
+    refused = _refused(recording, name)
     _require_columns(recording, refused)
     rows, acceleration_target, lean = (
         _rows(recording),
@@ -65,41 +67,22 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
     )
     time_s, thrust = rows.time_s, rows.throttle
     is_sound = np.isfinite(rows.z_m + rows.v_m_s + rows.v_t_m_s + acceleration_target + thrust)
-    is_sound &= (thrust >= 0.0) & (thrust <= 1.0)
-    conditions = (
-        (is_sound, TARGET, "has no rows of numbers beside positions"),
-        (_flying(recording, time_s), TAKEOFF, "never reports a flight: the log has no takeoff whose ramp was finished"),
-        (
-            ~(recording.at("vehicle_type", time_s) >= _OTHER_KINDS),
-            str(SOURCES["vehicle_type"]),
-            "is never that of a copter in flight",
-        ),
-        (
-            ~np.isin(recording.at("mode", time_s), _LEFT_OUT),
-            STATUS,
-            "has no mode in flight but takeoffs and landings, in which the ramp and the ground decide",
-        ),
-        (
-            np.isfinite(rows.z_d_m + rows.v_d_m_s + rows.a_d_m_s2),
-            str(SOURCES["reference_m"]),
-            "has no altitude to follow in flight, as in manual modes: fly in Hold, Mission or Offboard",
-        ),
-        (lean >= LARGEST_LEAN, f"{TARGET}.thrust", "leans by more than 30° throughout the flight"),
-    )
-    none_found = (
-        f"has no {SHORTEST_PART_S:g} s with an altitude to follow between takeoff and landing, without a gap of "
-        f"{LONGEST_INTERVAL_S:g} s, a reset of the estimator or a parameter change"
-    )
+    follows = np.isfinite(rows.z_d_m + rows.v_d_m_s + rows.a_d_m_s2)
     given, chosen = choose_parts(
         time_s,
-        conditions,
+        (
+            Condition(_flying(recording, time_s), ReasonCode.NEVER_FLEW, TAKEOFF),
+            Condition(~_coming_or_going(recording, time_s), ReasonCode.ONLY_TAKEOFFS_OR_LANDINGS, STATUS),
+            Condition(follows, ReasonCode.MANUAL_ALTITUDE, str(SOURCES["reference_m"])),
+            Condition(is_sound, ReasonCode.NOT_NUMBERS, TARGET),
+            Condition(lean >= LARGEST_LEAN, ReasonCode.LEANS, f"{TARGET}.thrust"),
+        ),
         _is_reset(recording, rows),
         recording.history({*LOOP_NAMES, VEHICLE}),
         _manoeuvres(rows),
         refused,
-        (TARGET, none_found),
         Px4Loop.space.bounds,
-        lambda _: "is missing",
+        lambda gain: Reason(code=ReasonCode.PARAMETER_MISSING, field=gain),
     )
     parameters, logged_s = parameters_from(given), float(np.median(np.diff(recording.columns["altitude_m"].time_s)))
     limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
@@ -128,7 +111,7 @@ def _rows(recording: Recording) -> Segment:
         for each in ("altitude_m", "climb_rate_m_s")
     )
     v_d, a_d = _feed_forward(recording, time_s)
-    thrust, unknown = columns["thrust_target"].values, np.full(len(time_s), np.nan)
+    thrust, unknown = within_limits(columns["thrust_target"].values), np.full(len(time_s), np.nan)
     return Segment(
         time_s=time_s,
         z_m=z_m,
@@ -147,7 +130,7 @@ def _rows(recording: Recording) -> Segment:
 def _lean(recording: Recording) -> Samples:
     """Cosine of the lean, shape (n,): the vertical share of the thrust."""
     columns = recording.columns
-    thrust = columns["thrust_target"].values
+    thrust = within_limits(columns["thrust_target"].values)
     horizontal = [
         columns[each].values ** 2 for each in ("thrust_target_north", "thrust_target_east") if each in columns
     ]
@@ -160,6 +143,16 @@ def _flying(recording: Recording, time_s: Samples) -> Rows:
     """Rows after the ramp of a takeoff, without contact to the ground."""
     on_ground = [np.nan_to_num(recording.at(each, time_s)) > 0.0 for each in ("is_landed", "has_contact")]
     return np.asarray((recording.at("takeoff_state", time_s) == FLIGHT) & ~np.any(on_ground, axis=0))
+
+
+def _coming_or_going(recording: Recording, time_s: Samples) -> Rows:
+    """Rows of takeoffs and landings, by the mode and, as any mode may land, by the last descent to each touchdown."""
+    altitude = recording.columns["altitude_m"]
+    downs_s = [event.time_s for event in recording.events_of(EventKind.LANDING)]
+    downs_s += [span.end_s for span in recording.armed or () if np.isfinite(span.end_s)]
+    landing = find_landings(altitude.time_s, altitude.values, recording.columns["climb_rate_m_s"].values, downs_s)
+    after = np.minimum(np.searchsorted(altitude.time_s, time_s), len(landing) - 1)
+    return np.asarray(landing[after] | np.isin(recording.at("mode", time_s), LEFT_OUT_MODES))
 
 
 def _is_reset(recording: Recording, rows: Segment) -> Rows:
@@ -221,16 +214,35 @@ def _feed_forward(recording: Recording, time_s: Samples) -> tuple[Samples, Sampl
     return np.where(near, v_d, np.nan), np.where(near, a_d, np.nan)
 
 
+def frame_of(recording: Recording) -> str:
+    """The kind of vehicle, by its status and parameters; empty if it is a copter with several rotors, or not known."""
+    latest = {each.name: each.value for each in recording.settings}
+    by_parameters = [
+        kind for name, kinds in AIRFRAMES.items() for kind, values in kinds.items() if latest.get(name) in values
+    ]
+    status = recording.columns.get("vehicle_type")
+    reported = [] if status is None else np.unique(status.values).tolist()
+    by_status = ["VTOL" if _ROTORS in reported else _KINDS[each] for each in reported if each in _KINDS]
+    return next(iter([*by_parameters, *by_status]), "")
+
+
+def _refused(recording: Recording, name: str) -> Refused:
+    hint = (
+        "Use PX4's .ulg log of a flight with altitude changes in Hold, Mission or Offboard mode, with bit 0 of "
+        "SDLOG_PROFILE set, its default. Takeoffs are left out: their ramp decides, not the gains."
+    )
+    return lambda reason: refusal(f"{name} cannot be analysed.", hint, [reason], recording.notes)
+
+
 def _require_columns(recording: Recording, refused: Refused) -> None:
-    """Require what an analysis needs, and that the vehicle flew on rotors at some time, if the log tells."""
+    """Require what an analysis needs, and that the vehicle flies on rotors alone, if the log tells."""
     if not recording.sources:
-        raise refused("file", "has no data: copy the whole log")
-    kinds = recording.columns.get("vehicle_type")
-    if kinds is not None and np.all(kinds.values >= _OTHER_KINDS):
-        raise refused(kinds.source, "is never that of a copter: fixed wing, or on the ground")
+        raise refused(Reason(code=ReasonCode.NO_DATA))
+    if frame := frame_of(recording):
+        raise refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
     for each in _NEEDED:
         source = SOURCES[each]
         if source.message not in recording.sources:
-            raise refused(source.message, "is missing: set bit 0 of SDLOG_PROFILE, its default, and fly again")
+            raise refused(Reason(code=ReasonCode.MESSAGE_MISSING, field=source.message))
         if each not in recording.columns:
-            raise refused(str(source), "is missing: this release is not supported")
+            raise refused(Reason(code=ReasonCode.COLUMN_MISSING, field=str(source)))

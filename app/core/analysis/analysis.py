@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Final
 
 import numpy as np
@@ -12,8 +13,8 @@ from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
 from app.core.analysis.proposal import propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
-from app.core.errors import Problem, TrajectoryError
 from app.core.models.copter import FLOWN
+from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples
 
 _SHORTEST_S: Final = 6.0
@@ -25,8 +26,16 @@ _OTHER_CONTROLLER_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_M_S2: Final = 1.5
 _LARGEST_MISFIT: Final = (0.005, 0.25)
 _LARGEST_SLOPE_DEVIATION: Final = 0.15
-_AT_REST: Final = (0.1, 0.2)
-"""Climb rate, m/s, and acceleration, m/s², below which the throttle is that of hover."""
+
+
+class Grade(StrEnum):
+    """How much a log answers: gains are judged; the vehicle is fitted, or its hover throttle known, and no gains are
+    proposed; the flight is described; nothing."""
+
+    FULL = "full"
+    PARTIAL = "partial"
+    DESCRIPTION = "description"
+    REFUSED = "refused"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +81,7 @@ class Response:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
     """Everything that a log answers. `loop` is that of the flight. `assessments` begins with the gains of the flight;
-    `proposed` is None if the log does not suffice, no gains do, or none are better, which `insufficient` then says.
+    `proposed` is None if the log does not suffice, no gains do, or none are better, which `why_none` then says.
     `at_limit` names proposed gains at an end of the range that was searched. `hover` is a better value of the parameter
     for the hover throttle, if the present one does not suit; if the vehicle is outside what the loop finds in flight,
     all assessments but the first, and `response`, are with this value."""
@@ -82,10 +91,15 @@ class Analysis:
     estimate: CopterEstimate
     assessments: Sequence[Assessment]
     proposed: Assessment | None
-    insufficient: str | None
+    why_none: Reason | None
     at_limit: Sequence[str]
     response: Response
     hover: HoverAdvice | None
+
+    @property
+    def grade(self) -> Grade:
+        """Full if gains are judged, even if none are better."""
+        return Grade.PARTIAL if self.why_none is not None and self.why_none.code in _NOT_JUDGED else Grade.FULL
 
     @property
     def answer(self) -> str:
@@ -96,8 +110,12 @@ class Analysis:
     @property
     def _about_gains(self) -> str:
         flown, proposed = self.assessments[0], self.proposed
-        if proposed is None:
-            return self.insufficient or ""
+        if (why := self.why_none) is not None:
+            return {
+                ReasonCode.NONE_BETTER: f"Keep the gains flown: the log {why.text}.",
+                ReasonCode.MARGIN_UNREACHABLE: f"The log {why.text}. Reduce its lags first: {self.loop.texts.lags}.",
+            }.get(why.code, f"The log does not suffice to propose gains: it {why.text}. {self.loop.texts.what_to_fly}")
+        assert proposed is not None
         measured = f"Mean deviation: {_mm(self.behaviour.error_m)} measured."
         if proposed.prediction.error_m > _BETTER * flown.prediction.error_m:
             return (
@@ -162,23 +180,20 @@ def analyze(flight: LoggedFlight) -> Analysis:
         assess = _assessor(flight, estimate)
     usual = loop.rules(flight.throttle_mean)
     compared = [present, *(assess(name, gains) for name, gains in usual.items())]
-    insufficient = _insufficient(flight, estimate)
-    gains = None if insufficient else propose(flight, estimate.few, [loop.gains, *usual.values()])
+    why = _insufficient(flight, estimate)
+    gains = None if why else propose(flight, estimate.few, [loop.gains, *usual.values()])
     proposed = assess("Proposed", gains) if gains else None
     if proposed is None:
-        insufficient = insufficient or (
-            "No gains within the documented ranges reach the required margin on this vehicle. Reduce its lags first: "
-            f"{loop.texts.lags}."
-        )
+        why = why or Reason(code=ReasonCode.MARGIN_UNREACHABLE)
     elif not _is_better(proposed, present):
-        gains, proposed, insufficient = None, None, _NONE_BETTER
+        gains, proposed, why = None, None, Reason(code=ReasonCode.NONE_BETTER)
     return Analysis(
         loop=loop,
         behaviour=behaviour,
         estimate=estimate,
         assessments=tuple(compared),
         proposed=proposed,
-        insufficient=insufficient,
+        why_none=why,
         at_limit=[*loop.named({name: gains[name] for name in loop.space.at_limit(gains)})] if gains else [],
         response=_response(flight, estimate, gains or loop.gains),
         hover=hover,
@@ -211,10 +226,7 @@ def _is_better(proposed: Assessment, present: Assessment) -> bool:
 
 
 _BETTER: Final = 0.95
-_NONE_BETTER: Final = (
-    "Keep the gains flown: their margin is sufficient, and no other gains are predicted to reduce the error by more "
-    "than 5 %."
-)
+_NOT_JUDGED: Final = (ReasonCode.NO_WHOLE_CHANGE, ReasonCode.SLOPE_UNKNOWN)
 
 
 def _response(flight: LoggedFlight, estimate: CopterEstimate, gains: Mapping[str, float]) -> Response:
@@ -246,57 +258,41 @@ def _behaviour(flight: LoggedFlight) -> Behaviour:
     )
 
 
-def _require_none(loop: AltitudeLoop, reasons: Iterator[str]) -> None:
+def _require_none(loop: AltitudeLoop, reasons: Iterator[Reason]) -> None:
     """Raise TrajectoryError with the first reason, if there is one."""
     if (reason := next(reasons, None)) is not None:
-        problems = (Problem("file", reason),)
-        raise TrajectoryError("The log cannot be analysed.", hint=loop.texts.what_to_fly, problems=problems)
+        raise refusal("The log cannot be analysed.", loop.texts.what_to_fly, [reason])
 
 
-def _obstacles(flight: LoggedFlight, behaviour: Behaviour) -> Iterator[str]:
+def _obstacles(flight: LoggedFlight, behaviour: Behaviour) -> Iterator[Reason]:
     """Why nothing can be learned from a flight: altitude hardly changes, acceleration and throttle are constant, as in
     messages that nobody filled in, or the climb rate target is not what the replica's position controller computes."""
     if behaviour.duration_s < _SHORTEST_S:
-        yield f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed{_in_hover(flight)}"
+        numbers = {"analysed_s": behaviour.duration_s, "needed_s": _SHORTEST_S}
+        yield Reason(code=ReasonCode.TOO_SHORT, numbers=numbers)
     if behaviour.reference_range_m < _LEAST_CHANGE_M:
-        yield (
-            f"has no altitude changes: the reference moves by {behaviour.reference_range_m:.2f} m, and "
-            f"{_LEAST_CHANGE_M:g} m are needed{_in_hover(flight)}"
-        )
+        numbers = {"reference_range_m": behaviour.reference_range_m, "needed_m": _LEAST_CHANGE_M}
+        yield Reason(code=ReasonCode.NO_ALTITUDE_CHANGES, numbers=numbers)
     if behaviour.saturated_share > _LARGEST_SATURATION:
-        yield f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows"
+        yield Reason(code=ReasonCode.SATURATED, numbers={"saturated_share": behaviour.saturated_share})
     for each in flight.segments:
         signals = (("acceleration", each.a_m_s2), ("throttle", each.throttle_filtered))
         if constant := [name for name, values in signals if np.ptp(values) < _LEAST_VARIATION]:
-            yield f"has a constant {' and '.join(constant)}: nothing can be learned from it"
+            yield Reason(code=ReasonCode.CONSTANT_SIGNAL, named=constant)
     loop = flight.loop
     apart = np.concatenate([np.abs(loop.climb_rate_targets(each) - each.v_t_m_s) for each in flight.segments])
     differing = int(np.sum(apart > loop.target_tolerance_m_s))
     if differing > _OTHER_CONTROLLER_SHARE * len(apart):
-        yield (
-            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {len(apart)} "
-            f"rows: {loop.texts.other_controller}"
-        )
+        numbers = {"differing_rows": differing, "rows": len(apart)}
+        yield Reason(code=ReasonCode.OTHER_CONTROLLER, numbers=numbers)
 
 
-def _in_hover(flight: LoggedFlight) -> str:
-    """What a flight that cannot be analysed tells of the vehicle nevertheless."""
-    slow_m_s, steady_m_s2 = _AT_REST
-    throttle = np.concatenate([
-        each.throttle_filtered[(np.abs(each.v_m_s) < slow_m_s) & (np.abs(each.a_m_s2) < steady_m_s2)]
-        for each in flight.segments
-    ])  # fmt: skip
-    return f"; the vehicle hovers at a throttle of {np.median(throttle):.2f}" if throttle.size else ""
-
-
-def find_unexplained(estimate: CopterEstimate) -> str | None:
+def find_unexplained(estimate: CopterEstimate) -> Reason | None:
     """Why no copter of the model flies so, or None if one may: accelerations that it does not explain."""
     if estimate.residual_m_s2 <= _LARGEST_RESIDUAL_M_S2:
         return None
-    return (
-        f"has accelerations that throttle and climb rate do not explain, {estimate.residual_m_s2:.1f} m/s² rms: gusts "
-        "too strong, oscillating rate controllers, or vibration compensation"
-    )
+    numbers = {"residual_m_s2": estimate.residual_m_s2}
+    return Reason(code=ReasonCode.UNEXPLAINED_ACCELERATIONS, numbers=numbers)
 
 
 def is_alike(flown_m: float, modelled_m: float) -> bool:
@@ -305,30 +301,23 @@ def is_alike(flown_m: float, modelled_m: float) -> bool:
     return abs(modelled_m - flown_m) <= max(least_m, share * flown_m)
 
 
-def _differences(behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> Iterator[str]:
+def _differences(behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> Iterator[Reason]:
     """Why the flight is not that of a copter of the model."""
     if (why := find_unexplained(estimate)) is not None:
         yield why
     if not is_alike(behaviour.error_m, present.prediction.error_m):
-        yield (
-            f"has a deviation of {1e3 * behaviour.error_m:.1f} mm, where the gains in the log make the fitted vehicle "
-            f"deviate by {1e3 * present.prediction.error_m:.1f} mm: perhaps it flew with other gains, for instance "
-            "set by a tuning knob, or something else replaced the controller"
-        )
+        numbers = {"flown_mm": 1e3 * behaviour.error_m, "modelled_mm": 1e3 * present.prediction.error_m}
+        yield Reason(code=ReasonCode.DEVIATION_NOT_EXPLAINED, numbers=numbers)
 
 
-def _insufficient(flight: LoggedFlight, estimate: CopterEstimate) -> str | None:
+def _insufficient(flight: LoggedFlight, estimate: CopterEstimate) -> Reason | None:
     known_to = estimate.deviation.thrust_slope
     if not _begins_and_ends_a_change(flight):
-        why = (
-            "no altitude change both begins and ends in it, as in the last part of a takeoff, so that slope, lag and "
-            "drag cannot be told apart."
-        )
-    elif known_to > _LARGEST_SLOPE_DEVIATION:
-        why = f"the thrust slope is known only to ±{known_to:.2f}; ±{_LARGEST_SLOPE_DEVIATION} is needed."
-    else:
-        return None
-    return f"The log is not sufficient to propose gains: {why} {flight.loop.texts.what_to_fly}"
+        return Reason(code=ReasonCode.NO_WHOLE_CHANGE)
+    if known_to > _LARGEST_SLOPE_DEVIATION:
+        numbers = {"thrust_slope_deviation": known_to, "needed_deviation": _LARGEST_SLOPE_DEVIATION}
+        return Reason(code=ReasonCode.SLOPE_UNKNOWN, numbers=numbers)
+    return None
 
 
 def _begins_and_ends_a_change(flight: LoggedFlight) -> bool:

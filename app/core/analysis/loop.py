@@ -85,8 +85,7 @@ class LoopTexts(MarginTexts):
 
     `prefix` is that of its parameters. `hover_parameter` holds the hover throttle that it assumes, within
     `hover_range`; `hover_use` says what for, and `hover_deviation` names the parameter of how far an estimate may be
-    from it, if there is one. `what_to_fly` answers a log that does not suffice, `lags` say what to reduce if no gains
-    do, `other_controller` what may have flown instead of this loop.
+    from it, if there is one. `what_to_fly` answers a log that does not suffice, `lags` what to reduce if no gains do.
     """
 
     autopilot: str
@@ -96,7 +95,6 @@ class LoopTexts(MarginTexts):
     hover_use: str
     what_to_fly: str
     lags: str
-    other_controller: str
     parameter_suffix: str
     hover_deviation: str = ""
 

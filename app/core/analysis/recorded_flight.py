@@ -11,8 +11,9 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.segment import LEAD_S, FinerSegment
-from app.core.errors import Problem, TrajectoryError
+from app.core.errors import TrajectoryError
 from app.core.models.set_points import SetPoints
+from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples, Trajectory
 
 _ROW_S: Final = 0.1
@@ -77,19 +78,17 @@ def require_channels(trajectory: Trajectory, steps: FlownSteps) -> None:
     """Require the channels, often enough. Raises TrajectoryError for the first that does not suffice."""
     for name in CHANNELS:
         if name not in trajectory.channels:
-            raise unanswered(name, f"is not among the recorded channels ({', '.join(trajectory.channels)})")
+            raise unanswered(Reason(code=ReasonCode.CHANNEL_MISSING, field=name, named=[*trajectory.channels]))
     within = (trajectory.time_s >= steps.begin_s - LEAD_S) & (trajectory.time_s <= steps.end_s)
     if np.ptp(trajectory["throttle"][within]) < _LEAST_VARIATION:
-        raise unanswered("throttle", "is constant: nothing can be learned from it")
+        raise unanswered(Reason(code=ReasonCode.CONSTANT_SIGNAL, field="throttle", named=["throttle"]))
     interval_s = float(np.median(np.diff(trajectory.time_s[within])))
     if interval_s > LARGEST_INTERVAL_S:
-        raise unanswered("time_s", f"has a sample every {interval_s:.2f} s; {LARGEST_INTERVAL_S:g} s are needed")
+        numbers = {"interval_s": interval_s, "needed_s": LARGEST_INTERVAL_S}
+        raise unanswered(Reason(code=ReasonCode.SAMPLES_RARE, field="time_s", numbers=numbers))
 
 
-def unanswered(field: str, reason: str) -> TrajectoryError:
+def unanswered(reason: Reason) -> TrajectoryError:
     """The error for a record that does not suffice."""
-    return TrajectoryError(
-        "This flight cannot be fitted.",
-        hint="Request the vehicle's position, throttle and reference at 50 Hz.",
-        problems=(Problem(field, reason),),
-    )
+    hint = "Request the vehicle's position, throttle and reference at 50 Hz."
+    return refusal("This flight cannot be fitted.", hint, [reason])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Final, Self
 
 from app.core.errors import InputError, Problem
+from app.core.reasons import Reason, ReasonCode
 
 PLAUSIBLE: Final = (0.0, 1e6)
 """No parameter of a vehicle's loop comes near the upper end; far beyond it, the replica's numbers overflow."""
@@ -70,7 +71,11 @@ class ReplicaParameters:
 def require_within(values: Mapping[str, float], ranges: Mapping[str, tuple[float, float]]) -> None:
     """Raise InputError naming every value outside its range or not a number; those missing are not checked."""
     _require(
-        Problem(name, f"must be {low:g} to {high:g}, got {values[name]:g}")
+        Reason(
+            code=ReasonCode.PARAMETER_OUT_OF_RANGE,
+            field=name,
+            numbers={"low": low, "high": high, "value": values[name]},
+        ).problem
         for name, (low, high) in ranges.items()
         if name in values and not (low <= values[name] <= high)
     )

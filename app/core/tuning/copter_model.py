@@ -143,7 +143,7 @@ class CopterModel(LimitedModel[Copter]):
         self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
         if (why := find_unexplained(self._estimate)) is not None:
             worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
-            raise _unlike(worst, why)
+            raise _unlike(worst, why.text)
         self._hover: Final = experiment.advise_hover(self._estimate.mean.hover_throttle)
         self._limit_by(experiment.space, flights)
 

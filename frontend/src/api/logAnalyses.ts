@@ -5,7 +5,7 @@ import { answer } from "./client";
 import { analyzeLog, getExampleAnalysis, startCampaign } from "./generated";
 import type { RecordFiles } from "./records";
 
-export type { LogAnalysis, Refusal, ReplicaAnswer, TuningAnswer } from "./generated";
+export type { Description, LogAnalysis, PartTexts, TuningAnswer } from "./generated";
 
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file; traces are .csv or .csv.gz. */
 export const ANALYSED_FILES = ".bin,.ulg,.tlog,.data,.log,.csv,.gz,text/csv";

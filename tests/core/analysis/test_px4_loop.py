@@ -174,7 +174,7 @@ def test_set_points_that_were_not_logged_are_refused() -> None:
     flight = simulated_px4()
     (segment,) = flight.segments
     unknown = replace(flight, segments=[replace(segment, v_t_m_s=segment.v_t_m_s + 0.3)])
-    with pytest.raises(TrajectoryError, match="set-points that were not logged") as refused:
+    with pytest.raises(TrajectoryError, match="climb rate targets that its parameters do not give") as refused:
         analyze(unknown)
     assert "In a takeoff the ramp decides" in refused.value.hint
 

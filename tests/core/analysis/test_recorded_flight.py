@@ -59,7 +59,7 @@ def test_a_step_of_the_loop_at_the_end_of_the_flight_is_its_last_row() -> None:
     ("channels", "missing", "field", "reason"),
     [
         ({}, "throttle", "throttle", "is not among the recorded channels (altitude_m, climb_rate_m_s, reference_m)"),
-        ({"throttle": 0.4}, "", "throttle", "is constant: nothing can be learned from it"),
+        ({"throttle": 0.4}, "", "throttle", "has a constant throttle: nothing can be learned from it"),
         ({"reference_m": 3.5}, "", "reference_m", "from the target that ArduCopter shapes from the set points"),
     ],
 )

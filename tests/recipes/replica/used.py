@@ -22,5 +22,5 @@ def test_the_trace_is_compared_step_by_step(at_10: tuple[float, ...], sentence: 
     answer, plots = analyze_content(trace(*STEPS[:10], at_10, *STEPS[11:]), None, "run.csv")
     assert answer.autopilot == "Toy"
     assert isinstance(answer.replica, ReplicaAnswer)
-    assert answer.replica.answer == sentence
+    assert answer.texts.replica.answer == sentence
     assert [plot.title for plot in plots["replica"]] == ["Throttle"]

@@ -8,6 +8,7 @@ from typing import Final
 
 from app.core.control.parameter_checks import ReplicaParameters, parameter
 from app.core.errors import InputError, Problem
+from app.core.reasons import ReasonCode
 
 STEP_S: Final = 1 / 400
 """One loop at the default SCHED_LOOP_RATE."""
@@ -143,7 +144,9 @@ def parameters_from(values: Mapping[str, float]) -> Parameters:
     """
     unsupported = [(newer, older) for newer, (older, _) in NEWER_NAMES.items() if older in UNSUPPORTED]
     if problems := tuple(
-        Problem(older, f"must be 0 ({newer} since release 4.7)") for newer, older in unsupported if values.get(older)
+        Problem(older, f"must be 0 ({newer} since release 4.7)", code=ReasonCode.PARAMETER_UNSUPPORTED.key)
+        for newer, older in unsupported
+        if values.get(older)
     ):
         raise InputError(
             "The replica has no limits and notch filters inside the controllers.",

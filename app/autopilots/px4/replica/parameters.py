@@ -10,7 +10,8 @@ import numpy as np
 
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.core.control.parameter_checks import ReplicaParameters, parameter, require_within
-from app.core.errors import InputError, Problem
+from app.core.errors import InputError
+from app.core.reasons import Reason, ReasonCode
 
 STEP_S: Final = 1 / 125
 """Interval of the estimates of position in PX4's own simulation."""
@@ -89,7 +90,11 @@ def parameters_from(values: Mapping[str, float]) -> Parameters:
 
     Raises InputError that names a value outside its range, or one that the replica lacks.
     """
-    if problems := tuple(Problem(name, "must be 0") for name in UNSUPPORTED if not values.get(name, 0.0) <= 0.0):
+    if problems := tuple(
+        Reason(code=ReasonCode.PARAMETER_UNSUPPORTED, field=name).problem
+        for name in UNSUPPORTED
+        if not values.get(name, 0.0) <= 0.0
+    ):
         raise InputError(
             "The replica has no notch filter of the velocity.",
             hint="Record the loop with the filter off, its default.",

@@ -896,6 +896,31 @@ export type Control = {
 };
 
 /**
+ * Copter
+ *
+ * What the model has in place of a vehicle: throttle in hover, 0 … 1, slope of log thrust over log throttle, lag of
+ * the motors, s, and drag, 1/s. The slope is 1 if the autopilot's thrust curve fits the propellers.
+ */
+export type Copter = {
+    /**
+     * Hover Throttle
+     */
+    hover_throttle: number;
+    /**
+     * Thrust Slope
+     */
+    thrust_slope: number;
+    /**
+     * Motor Lag S
+     */
+    motor_lag_s: number;
+    /**
+     * Drag 1 S
+     */
+    drag_1_s: number;
+};
+
+/**
  * Definition
  *
  * Everything besides the flights that a proposal depends on. Frozen at the first flight.
@@ -1015,6 +1040,55 @@ export type DefinitionOutput = {
      * Seed
      */
     seed: number;
+};
+
+/**
+ * Description
+ *
+ * A flight as it was flown; None for what it does not tell.
+ *
+ * The hover throttle is the median at rest, with its standard deviation; the deviation is the distance of altitude and
+ * reference where the altitude was held, and the saturated share that of its rows with the throttle at a limit. An
+ * oscillation is searched for in the longest part with the altitude held; for 0 s in none that is long enough.
+ */
+export type Description = {
+    /**
+     * Flown S
+     */
+    flown_s: number;
+    /**
+     * Held S
+     */
+    held_s: number;
+    /**
+     * Altitude Range M
+     */
+    altitude_range_m: number;
+    /**
+     * Hover Throttle
+     */
+    hover_throttle: number | null;
+    /**
+     * Hover Throttle Deviation
+     */
+    hover_throttle_deviation: number | null;
+    /**
+     * Deviation Mean M
+     */
+    deviation_mean_m: number | null;
+    /**
+     * Deviation Largest M
+     */
+    deviation_largest_m: number | null;
+    /**
+     * Saturated Share
+     */
+    saturated_share: number | null;
+    /**
+     * Searched S
+     */
+    searched_s: number;
+    oscillation: Oscillation | null;
 };
 
 /**
@@ -1268,6 +1342,22 @@ export type Explanation = {
      * Trust Fraction
      */
     trust_fraction: number | null;
+};
+
+/**
+ * Facts
+ *
+ * Formatted numbers about one thing.
+ */
+export type Facts = {
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Values
+     */
+    values: Array<string>;
 };
 
 /**
@@ -1837,11 +1927,9 @@ export type GainsInTakeoff = {
      */
     flown_error_m: number | null;
     /**
-     * Refusal
-     *
-     * why the gate refuses these gains; empty: it does not
+     * Passes Gate
      */
-    refusal: string;
+    passes_gate: boolean;
 };
 
 /**
@@ -1966,6 +2054,14 @@ export type Glitch = {
 };
 
 /**
+ * Grade
+ *
+ * How much a log answers: gains are judged; the vehicle is fitted, or its hover throttle known, and no gains are
+ * proposed; the flight is described; nothing.
+ */
+export type Grade = 'full' | 'partial' | 'description' | 'refused';
+
+/**
  * GroupBrief
  *
  * The valid flights of one gain set: their mean and its standard error, from the scatter pooled over the campaign;
@@ -2035,10 +2131,6 @@ export type HoverSetting = {
      * whether the vehicle hovers outside MPC_THR_HOVER ± HTE_THR_RANGE, where PX4's estimate stops; the gain sets but the first are then assessed with the proposed value
      */
     is_outside: boolean;
-    /**
-     * Reason
-     */
-    reason: string;
 };
 
 /**
@@ -2295,6 +2387,10 @@ export type LeaseRequest = {
  */
 export type LogAnalysis = {
     /**
+     * Schema Version
+     */
+    schema_version: 1;
+    /**
      * File Name
      */
     file_name: string;
@@ -2305,13 +2401,23 @@ export type LogAnalysis = {
      */
     autopilot: string;
     /**
-     * Tuning
+     * Release
+     *
+     * of the firmware; null: not in the log
      */
-    tuning: TuningAnswer | Refusal;
+    release: string | null;
+    /**
+     * Frame
+     *
+     * of the vehicle; null: not in the log
+     */
+    frame: string | null;
+    tuning: TuningAnswer;
     /**
      * Replica
      */
     replica: ReplicaAnswer | Refusal;
+    texts: Texts;
     /**
      * Figures
      *
@@ -2434,6 +2540,12 @@ export type ManoeuvreNumbers = {
      * none if the present value suits
      */
     hover: HoverSetting | null;
+    /**
+     * Assumed
+     *
+     * parameters not in the log, assumed to have their default
+     */
+    assumed: Array<string>;
 };
 
 /**
@@ -2615,6 +2727,27 @@ export type OrderAnswer = {
 };
 
 /**
+ * Oscillation
+ *
+ * A line in the spectrum of the deviation: its frequency, the mean amplitude since it began, and when that was, s
+ * of the recording.
+ */
+export type Oscillation = {
+    /**
+     * Frequency Hz
+     */
+    frequency_hz: number;
+    /**
+     * Amplitude M
+     */
+    amplitude_m: number;
+    /**
+     * Since S
+     */
+    since_s: number;
+};
+
+/**
  * Outcome
  *
  * Why a campaign is finished.
@@ -2764,6 +2897,36 @@ export type ParameterFile = {
 };
 
 /**
+ * PartTexts
+ *
+ * A part of the answer for a person.
+ */
+export type PartTexts = {
+    /**
+     * Answer
+     */
+    answer: string;
+    /**
+     * Reasons
+     *
+     * the part's reasons as sentences
+     */
+    reasons: Array<string>;
+    /**
+     * Facts
+     */
+    facts: Array<Facts>;
+    table: TextTable | null;
+    /**
+     * Notes
+     *
+     * how to read the table, precautions, what to do
+     */
+    notes: Array<string>;
+    parameter_file: ParameterFile | null;
+};
+
+/**
  * PredictedCurve
  *
  * The scored output of a predicted flight over time, thinned for drawing.
@@ -2798,34 +2961,6 @@ export type PresetInfo = {
      */
     line: string;
     campaign: NewCampaignOutput;
-};
-
-/**
- * ProblemField
- *
- * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
- * pass, by name, where any are known. `code` is the reason, or the value of the field that would pass, for programs;
- * empty where there is none.
- */
-export type ProblemField = {
-    /**
-     * Field
-     */
-    field: string;
-    /**
-     * Reason
-     */
-    reason: string;
-    /**
-     * Offer
-     */
-    offer?: {
-        [key: string]: number | number;
-    };
-    /**
-     * Code
-     */
-    code?: string;
 };
 
 /**
@@ -2917,6 +3052,40 @@ export type Proposal = {
 export type Reading = 'milliseconds' | 'microseconds' | 'centimetres' | 'millimetres' | 'feet' | 'down-positive' | 'other-datum';
 
 /**
+ * ReasonField
+ *
+ * Why a part does not answer, or not in full.
+ */
+export type ReasonField = {
+    /**
+     * Code
+     *
+     * a code of app.core.reasons
+     */
+    code: string;
+    /**
+     * Field
+     *
+     * the message, column or parameter concerned; file: the whole log
+     */
+    field: string;
+    /**
+     * Numbers
+     *
+     * by names that end in their unit
+     */
+    numbers: {
+        [key: string]: number;
+    };
+    /**
+     * Named
+     *
+     * what else the reason names: modes, parameters, a kind of vehicle
+     */
+    named: Array<string>;
+};
+
+/**
  * RecordBrief
  *
  * The stored record of a flight, without its samples. `ending`: whether the flight was completed, was aborted, or
@@ -2964,21 +3133,13 @@ export type RecordBrief = {
 /**
  * Refusal
  *
- * Why the log does not answer: what happened, the fields concerned, and what to do.
+ * Why the log is not compared with a replica.
  */
 export type Refusal = {
     /**
-     * Title
+     * Reasons
      */
-    title: string;
-    /**
-     * Hint
-     */
-    hint: string;
-    /**
-     * Problems
-     */
-    problems: Array<ProblemField>;
+    reasons: Array<ReasonField>;
 };
 
 /**
@@ -3078,10 +3239,6 @@ export type RepeatGroup = {
  */
 export type ReplicaAnswer = {
     /**
-     * Answer
-     */
-    answer: string;
-    /**
      * Agrees
      *
      * whether every signal does
@@ -3093,22 +3250,6 @@ export type ReplicaAnswer = {
      * the log of a flight, or a trace with every step
      */
     kind: 'log' | 'trace';
-    /**
-     * Facts
-     *
-     * what was compared, and the gains
-     */
-    facts: Array<string>;
-    /**
-     * the difference of every signal
-     */
-    table: TextTable;
-    /**
-     * Notes
-     *
-     * what is allowed, and how it was compared
-     */
-    notes: Array<string>;
     /**
      * Rows
      *
@@ -3130,10 +3271,6 @@ export type ReplicaAnswer = {
         [key: string]: number | number;
     } | null;
     /**
-     * Gains From
-     */
-    gains_from: string;
-    /**
      * Better Gains
      *
      * other gains that reproduce more of the commands
@@ -3144,7 +3281,7 @@ export type ReplicaAnswer = {
     /**
      * Signals
      */
-    signals: Array<SignalResult>;
+    signals: Array<SignalNumbers>;
 };
 
 /**
@@ -3355,37 +3492,28 @@ export type Run = {
 };
 
 /**
- * SignalResult
+ * SignalNumbers
  *
- * Result of one signal: the largest difference between recording and replica in `difference_unit`, the tolerance,
- * the number of samples that differ by more, and the time of the first of these, s. If the signal is judged by its
- * median difference, that is given, and the tolerance is the median's.
+ * Result of one signal: the largest difference between recording and replica, the tolerance, and the number of
+ * samples that differ by more; of a signal judged by its median difference, the tolerance is the median's.
  */
-export type SignalResult = {
+export type SignalNumbers = {
     /**
      * Name
      */
     name: string;
     /**
-     * Title
+     * Difference Unit
      */
-    title: string;
+    difference_unit: string;
     /**
      * Largest Difference
      */
     largest_difference: number;
     /**
-     * Difference Unit
-     */
-    difference_unit: string;
-    /**
      * Tolerance
      */
     tolerance: number;
-    /**
-     * Allowance
-     */
-    allowance: string;
     /**
      * Verdict
      */
@@ -3401,7 +3529,7 @@ export type SignalResult = {
     /**
      * Median Difference
      */
-    median_difference?: number | null;
+    median_difference: number | null;
 };
 
 /**
@@ -3755,6 +3883,10 @@ export type TakeoffNumbers = {
  */
 export type TextTable = {
     /**
+     * Title
+     */
+    title: string;
+    /**
      * Columns
      */
     columns: Array<string>;
@@ -3762,6 +3894,16 @@ export type TextTable = {
      * Rows
      */
     rows: Array<Array<string>>;
+};
+
+/**
+ * Texts
+ *
+ * All that is written for a person.
+ */
+export type Texts = {
+    tuning: PartTexts;
+    replica: PartTexts;
 };
 
 /**
@@ -4230,17 +4372,23 @@ export type Trouble = {
 /**
  * TuningAnswer
  *
- * How the altitude was controlled, the fitted vehicle, and better gains.
+ * How the altitude was controlled, the vehicle, and better gains, as far as the log tells.
  */
 export type TuningAnswer = {
     /**
-     * Answer
+     * full: gains are judged; partial: the vehicle is fitted or its hover throttle known, and no gains are proposed; description: the flight alone; refused: nothing
      */
-    answer: string;
+    grade: Grade;
+    /**
+     * Reasons
+     *
+     * why the grade is no better, or nothing is proposed
+     */
+    reasons: Array<ReasonField>;
     /**
      * Proposes
      *
-     * whether gains are proposed; if not, `answer` says why
+     * whether gains are proposed
      */
     proposes: boolean;
     /**
@@ -4256,32 +4404,49 @@ export type TuningAnswer = {
      */
     experiment: string | null;
     /**
-     * Flight
-     *
-     * how the altitude was controlled
+     * the whole flight as it was flown
      */
-    flight: Array<string>;
-    /**
-     * Vehicle
-     *
-     * the fitted vehicle
-     */
-    vehicle: Array<string>;
-    /**
-     * the sets flown, the proposed one, and others
-     */
-    gains: TextTable;
-    /**
-     * Notes
-     *
-     * how to read the table, and precautions
-     */
-    notes: Array<string>;
-    parameter_file: ParameterFile | null;
+    description: Description | null;
     /**
      * Numbers
      */
-    numbers: ManoeuvreNumbers | TakeoffNumbers;
+    numbers: ManoeuvreNumbers | UsualNumbers | TakeoffNumbers | null;
+};
+
+/**
+ * UsualGains
+ *
+ * A gain set by the names of the vehicle's release, and its margin; 0 if it rings.
+ */
+export type UsualGains = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number;
+    };
+    /**
+     * Margin
+     */
+    margin: number;
+};
+
+/**
+ * UsualNumbers
+ *
+ * Margins on a copter with the hover throttle of the log and what is usual, where it tells the gains and no more.
+ * `assessments` begins with the gains flown; a margin of 0 is less than 1, and one of 8 at least 8.
+ */
+export type UsualNumbers = {
+    vehicle: Copter;
+    /**
+     * Assessments
+     */
+    assessments: Array<UsualGains>;
 };
 
 /**
@@ -4654,6 +4819,44 @@ export type Winner = {
      * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
      */
     verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
+};
+
+/**
+ * ProblemField
+ *
+ * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
+ * pass, by name, where any are known. `code` is for programs: of a record, the reason or the value of the field that
+ * would pass; of a log, the reason, with its numbers and what else it names. Empty where there is none.
+ */
+export type ProblemField = {
+    /**
+     * Field
+     */
+    field: string;
+    /**
+     * Reason
+     */
+    reason: string;
+    /**
+     * Offer
+     */
+    offer?: {
+        [key: string]: number | number;
+    };
+    /**
+     * Code
+     */
+    code?: string;
+    /**
+     * Numbers
+     */
+    numbers?: {
+        [key: string]: number;
+    };
+    /**
+     * Named
+     */
+    named?: Array<string>;
 };
 
 /**

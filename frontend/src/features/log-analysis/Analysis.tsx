@@ -1,18 +1,30 @@
 import { Button, Group, SimpleGrid, Text, Title, useComputedColorScheme } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import type { LogAnalysis, Refusal, ReplicaAnswer, TuningAnswer } from "../../api/logAnalyses";
+import type { LogAnalysis, PartTexts, TuningAnswer } from "../../api/logAnalyses";
 import type { RecordFiles } from "../../api/records";
 import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { StateBadge } from "../../ui/Badges";
 import { DataTable } from "../../ui/DataTable";
-import { gainText, stopped } from "../../ui/format";
+import { gainText } from "../../ui/format";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
+import { bad, good, quiet, type StateLabel } from "../../ui/states";
+import { Flight } from "./Flight";
+import { GainsAsked } from "./GainsAsked";
 import { StartCampaign } from "./StartCampaign";
 
 const FIGURE_HEIGHT_PX = 560;
-const ROW_PX = 37;
+const ROW_PX = 41;
+const HEADER_PX = 64;
+
+const GRADES: Record<TuningAnswer["grade"], StateLabel> = {
+  full: good("Full answer"),
+  partial: quiet("Partial answer"),
+  description: quiet("Description only"),
+  refused: bad("No answer"),
+};
 
 interface Props {
   analysis: LogAnalysis;
@@ -22,93 +34,99 @@ interface Props {
   onGains: (gains: string) => void;
 }
 
-/** The answers of a log. What it does not answer comes last, with the reason. */
+/** The answers of a log, as far as it gives them. */
 export function Analysis({ analysis, files, onGains }: Props) {
-  const { file_name, autopilot, tuning, replica, figures } = analysis;
+  const { file_name, autopilot, release, frame, tuning, replica, texts, figures } = analysis;
   const drawn = figures[useComputedColorScheme("light")] ?? {};
+  const compared = "signals" in replica;
+  const betterGains = compared ? replica.better_gains : null;
   const parts = [
-    isRefusal(tuning) ? (
-      <Refused key="tuning" title="No gains from this log" refusal={tuning} />
-    ) : (
-      <Answer
-        key="tuning"
-        title="Better gains"
-        answer={tuning.answer}
-        good={tuning.proposes}
-        facts={[["Flight", tuning.flight] as const, ["Vehicle", tuning.vehicle] as const]}
-        table={tuning.gains}
-        label="Gains compared"
-        notes={tuning.notes}
-        figures={drawn["tuning"]}
-      >
-        {files && tuning.starts_campaign && <StartCampaign files={files} experiment={tuning.experiment} />}
-        {tuning.parameter_file && <DownloadButton {...tuning.parameter_file} />}
-      </Answer>
-    ),
-    isRefusal(replica) ? (
-      <Refused key="replica" title="Not compared with the replica of the controller" refusal={replica} />
-    ) : (
-      <Answer
-        key="replica"
-        title="Replica of the controller"
-        answer={replica.answer}
-        good={replica.agrees}
-        facts={[[autopilot, replica.facts] as const]}
-        table={replica.table}
-        label="Difference of every signal"
-        notes={replica.notes}
-        figures={drawn["replica"]}
-      >
-        {files && replica.better_gains && <BetterGains gains={replica.better_gains} onGains={onGains} />}
-      </Answer>
-    ),
+    <Part
+      key="tuning"
+      title="Gains"
+      badge={GRADES[tuning.grade]}
+      texts={texts.tuning}
+      tone={tuning.proposes ? "var(--best)" : undefined}
+      label="Gains compared"
+      figures={drawn["tuning"]}
+      description={tuning.description && <Flight description={tuning.description} />}
+    >
+      {files && tuning.starts_campaign && <StartCampaign files={files} experiment={tuning.experiment} />}
+      {texts.tuning.parameter_file && <DownloadButton {...texts.tuning.parameter_file} />}
+    </Part>,
+    <Part
+      key="replica"
+      title="Replica of the controller"
+      badge={compared ? (replica.agrees ? good("Agrees") : bad("Differs")) : quiet("Not compared")}
+      texts={texts.replica}
+      tone={compared ? (replica.agrees ? "var(--best)" : "var(--bad)") : undefined}
+      label="Difference of every signal"
+      figures={drawn["replica"]}
+    >
+      {files && betterGains && <BetterGains gains={betterGains} onGains={onGains} />}
+      {!compared && replica.reasons.some(({ field }) => field === "gains") && (
+        <GainsAsked name={file_name} onGains={onGains} />
+      )}
+    </Part>,
   ];
   return (
     <article className={page["stack"]} aria-label={`Analysis of ${file_name}`}>
-      <Title order={2} fz="var(--text-page)">
-        {file_name}
-      </Title>
-      {isRefusal(tuning) ? parts.reverse() : parts}
+      <div>
+        <Title order={2} fz="var(--text-page)">
+          {file_name}
+        </Title>
+        <Text c="dimmed">{[autopilot, release, frame].filter(Boolean).join(" · ")}</Text>
+      </div>
+      {tuning.grade === "refused" && compared ? parts.reverse() : parts}
     </article>
   );
 }
 
-function isRefusal(part: TuningAnswer | ReplicaAnswer | Refusal): part is Refusal {
-  return "problems" in part;
-}
-
-interface AnswerProps {
+interface PartProps {
   title: string;
-  answer: string;
-  /** Whether the answer is good news. */
-  good: boolean;
-  facts: readonly (readonly [string, readonly string[]])[];
-  table: TuningAnswer["gains"];
+  badge: StateLabel;
+  texts: PartTexts;
+  /** Colour of the answer, if it is good or bad news. */
+  tone: string | undefined;
   label: string;
-  notes: readonly string[];
   figures: readonly FigureCard[] | undefined;
+  description?: ReactNode;
   /** Buttons. */
   children: ReactNode;
 }
 
-/** One part of the analysis: its answer in a sentence, facts, table, notes and figures. */
-function Answer({ title, answer, good, facts, table, label, notes, figures = [], children }: AnswerProps) {
-  const columns = table.columns.map((name) => ({ name, title: name, unit: "", digits: null }));
+/** One part of the analysis: its answer in a sentence, reasons, flight, facts, table, notes and figures. */
+function Part({ title, badge, texts, tone, label, figures = [], description, children }: PartProps) {
+  const { answer, reasons, facts, table, notes } = texts;
   return (
     <>
-      <Panel title={title}>
-        <Text maw="60ch" mb={10} fz="var(--text-page)" fw={650} lh={1.35} c={good ? "var(--best)" : "var(--bad)"}>
+      <Panel title={title} tools={<StateBadge words={badge} />}>
+        <Text maw="60ch" mb={10} fz="var(--text-page)" fw={650} lh={1.35} {...(tone && { c: tone })}>
           {answer}
         </Text>
-        {facts.map(([name, values]) => (
-          <Group key={name} component="p" gap="2px 14px" c="dimmed" fz="small">
-            <b>{name}</b>
-            {values.map((fact) => (
-              <span key={fact}>{fact}</span>
-            ))}
-          </Group>
+        {reasons.map((reason) => (
+          <Text key={reason} maw="90ch" mb={6} lh={1.45}>
+            {reason}
+          </Text>
         ))}
-        <DataTable table={{ columns, rows: table.rows }} label={label} height={ROW_PX * (table.rows.length + 1)} />
+        {description}
+        {facts
+          .filter(({ title: name }) => !description || name !== "Whole flight")
+          .map(({ title: name, values }) => (
+            <Group key={name} component="p" gap="2px 14px" c="dimmed" fz="small">
+              <b>{name}</b>
+              {values.map((fact) => (
+                <span key={fact}>{fact}</span>
+              ))}
+            </Group>
+          ))}
+        {table && (
+          <DataTable
+            table={{ columns: table.columns.map(plainColumn), rows: table.rows }}
+            label={label}
+            height={ROW_PX * table.rows.length + HEADER_PX}
+          />
+        )}
         <ul className={page["notes"]}>
           {notes.map((note) => (
             <li key={note}>{note}</li>
@@ -118,35 +136,27 @@ function Answer({ title, answer, good, facts, table, label, notes, figures = [],
           {children}
         </Group>
       </Panel>
-      <SimpleGrid type="container" cols={{ base: 1, "860px": figures.length }} spacing="var(--gap)">
-        {figures.map((card) => (
-          // As high on a phone, so that the titles of the axes have room.
-          <FigurePanel
-            key={card.title}
-            title={card.title}
-            card={card}
-            error={null}
-            height={FIGURE_HEIGHT_PX}
-            tallest="400vw"
-          />
-        ))}
-      </SimpleGrid>
+      {figures.length > 0 && (
+        <SimpleGrid type="container" cols={{ base: 1, "860px": figures.length }} spacing="var(--gap)">
+          {figures.map((card) => (
+            // As high on a phone, so that the titles of the axes have room.
+            <FigurePanel
+              key={card.title}
+              title={card.title}
+              card={card}
+              error={null}
+              height={FIGURE_HEIGHT_PX}
+              tallest="400vw"
+            />
+          ))}
+        </SimpleGrid>
+      )}
     </>
   );
 }
 
-function Refused({ title, refusal }: { title: string; refusal: Refusal }) {
-  return (
-    <Panel title={title}>
-      <Text maw="90ch">{refusal.title}</Text>
-      <ul className={page["notes"]}>
-        {refusal.problems.map(({ field, reason }) => (
-          <li key={`${field} ${reason}`}>{stopped(field === "file" ? `It ${reason}` : `${field} ${reason}`)}</li>
-        ))}
-        <li>{refusal.hint}</li>
-      </ul>
-    </Panel>
-  );
+function plainColumn(name: string) {
+  return { name, title: name, unit: "", digits: null };
 }
 
 function DownloadButton({ name, content }: { name: string; content: string }) {

@@ -1,8 +1,7 @@
-import { Button, FileButton, Group, Skeleton, Text, TextInput, Title } from "@mantine/core";
+import { Button, FileButton, Group, Skeleton, Text, Title } from "@mantine/core";
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
 import { useRef, useState } from "react";
 import { ANALYSED_FILES, type AnalysedLog, useAnalyzeLog } from "../../api/logAnalyses";
-import { problemOf } from "../../api/problems";
 import { recordOf } from "../../api/records";
 import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
@@ -58,7 +57,7 @@ export function LogAnalysisPage() {
         <Text maw="90ch" lh={1.45} mb={10}>
           Drop or choose a log. ArduCopter's .bin or PX4's .ulg: a flight in a mode that holds altitude, with climbs and
           descents of about 2 m and 5 s of hover in between; or a .tlog of it in GUIDED or Offboard. Paparazzi: .data
-          and .log, or .tlog, of takeoffs to 3 m. Nothing is stored.
+          and .log, or .tlog, of takeoffs to 3 m. Any other flight of a copter is described. Nothing is stored.
         </Text>
         <Text maw="90ch" lh={1.45} mb={10}>
           Every signal of the controller that the log contains is also compared with Gainline's replica of that
@@ -83,22 +82,7 @@ export function LogAnalysisPage() {
         </Group>
         {error !== null && <Text fw={650}>{name}</Text>}
         <ErrorNotice error={error} />
-        {variables && problemOf(error)?.problems.some(({ field }) => field === "gains") && (
-          <GainsAsked name={name} onGains={(gains) => analyze({ ...variables, gains })} />
-        )}
       </Panel>
     </div>
-  );
-}
-
-/** Input for the gains of a log that does not contain them. */
-function GainsAsked({ name, onGains }: { name: string; onGains: (gains: string) => void }) {
-  return (
-    <form action={(entered) => onGains(String(entered.get("gains")).replaceAll(/\s+/g, ""))}>
-      <Group gap={10} mt={10} align="end">
-        <TextInput name="gains" label="Gains flown: kp, ki, kd" placeholder="283, 13, 82" required />
-        <Button type="submit">Analyse {name} with these gains</Button>
-      </Group>
-    </form>
   );
 }

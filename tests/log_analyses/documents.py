@@ -1,0 +1,37 @@
+"""What every answer to a log is, as JSON: valid by the documented schema, and data outside of its texts."""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from jsonschema import Draft202012Validator
+
+from app.log_analyses.schemas import LogAnswer
+
+DOCUMENTED: Final = Path(__file__).parents[2] / "docs" / "log-answer.schema.json"
+_MAY_HAVE_BLANKS: Final = frozenset({"file_name", "name", "title"})
+
+
+def generated() -> dict[str, Any]:
+    """The schema of what the program writes."""
+    return LogAnswer.model_json_schema(mode="serialization")
+
+
+def require_data(answer: Mapping[str, Any]) -> None:
+    """Fail unless an answer is valid, and has no formatted string outside of its texts."""
+    Draft202012Validator(json.loads(DOCUMENTED.read_text())).validate(dict(answer))
+    found = {place: text for place, text in _strings(answer) if " " in text or "\u00a0" in text}
+    assert found == {}, found
+
+
+def _strings(value: object, place: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(value, str):
+        yield place, value
+    elif isinstance(value, Mapping):
+        for name, each in value.items():
+            if name != "texts" and name not in _MAY_HAVE_BLANKS:
+                yield from _strings(each, f"{place}.{name}")
+    elif isinstance(value, list):
+        for number, each in enumerate(value):
+            yield from _strings(each, f"{place}[{number}]")

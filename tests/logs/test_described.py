@@ -1,0 +1,114 @@
+"""What recordings of every kind give for the description of their flight, and the loop with their gains."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.described import loop_of, signals_of
+from app.autopilots.px4.log import read_px4
+from app.autopilots.recording import Recording
+from app.autopilots.tlog import read_tlog
+from app.core.analysis.description import Description, describe
+from app.core.analysis.hand_rules import usual_margins
+from app.core.analysis.loop import LoggedFlight
+from tests.core.analysis.flights import QUIET, simulated_flight
+from tests.core.analysis.px4_flights import simulated_px4
+from tests.logs.written import GUIDED, LANDED, NEWER_PARAMETERS, NOT_LANDED, PARAMETERS, STABILIZE, ardupilot_log
+from tests.logs.written_px4 import px4_log
+from tests.logs.written_tlog import Recording as Telemetry
+
+
+def copter(content: bytes) -> Recording:
+    return read_ardupilot(io.BytesIO(content))
+
+
+def described(recording: Recording) -> Description:
+    signals = signals_of(recording)
+    assert signals is not None
+    found = describe(signals)
+    assert found is not None
+    return found
+
+
+def oscillating(frequency_hz: float, amplitude_m: float) -> LoggedFlight:
+    """40 s of hover at 5 m about which the altitude oscillates."""
+    flight = simulated_flight(QUIET)
+    (segment,) = flight.segments
+    time_s = np.arange(0.0, 40.0, 0.1)
+    rows = {name: np.resize(getattr(segment, name)[20:40], len(time_s)) for name in type(segment).__slots__}
+    wave = amplitude_m * np.sin(2.0 * np.pi * frequency_hz * time_s)
+    still = {name: np.zeros_like(time_s) for name in ("v_m_s", "a_m_s2", "v_d_m_s", "a_d_m_s2", "v_t_m_s")}
+    altitudes = {"z_m": 5.0 + wave, "z_d_m": np.full_like(time_s, 5.0)}
+    return replace(flight, segments=[replace(segment, **{**rows, **still, **altitudes, "time_s": time_s})])
+
+
+def test_an_oscillation_of_a_hover_is_found_in_its_log() -> None:
+    found = described(copter(ardupilot_log(oscillating(0.6, 0.15))))
+    assert found.oscillation is not None
+    assert found.oscillation.frequency_hz == pytest.approx(0.6, rel=0.02)
+    assert found.oscillation.amplitude_m == pytest.approx(0.15, rel=0.05)
+    assert found.hover_throttle == pytest.approx(0.4, abs=0.005)
+    assert found.searched_s > 35.0
+
+
+@pytest.mark.parametrize("kind", ["bin", "ulg", "tlog", "slow"])
+def test_every_kind_of_log_tells_the_hover_throttle_and_the_deviation(kind: str) -> None:
+    """The simulated vehicles hover at 0.4; a slow telemetry log has four messages a second."""
+    recordings = {
+        "bin": lambda: copter(ardupilot_log(simulated_flight(QUIET))),
+        "ulg": lambda: read_px4(io.BytesIO(px4_log(simulated_px4()))),
+        "tlog": lambda: read_tlog(io.BytesIO(Telemetry().content)),
+        "slow": lambda: read_tlog(io.BytesIO(replace(Telemetry(), every=12).content)),
+    }
+    found = described(recordings[kind]())
+    assert found.hover_throttle == pytest.approx(0.4, abs=0.01)
+    assert found.deviation_mean_m is not None
+    assert 0.005 < found.deviation_mean_m < 0.05
+    assert found.held_s > 12.0
+
+
+def test_manual_modes_and_the_ground_are_not_held_and_not_flown() -> None:
+    log = ardupilot_log(
+        simulated_flight(QUIET),
+        modes=((0.0, GUIDED), (15.0, STABILIZE)),
+        events=((0.0, NOT_LANDED), (20.0, LANDED)),
+    )
+    found = described(copter(log))
+    assert (found.flown_s, found.held_s) == pytest.approx((10.0, 5.0), abs=0.21)
+
+
+def test_a_recording_without_an_altitude_has_no_signals() -> None:
+    recording = copter(ardupilot_log(simulated_flight(QUIET)))
+    without = {name: column for name, column in recording.columns.items() if name != "altitude_m"}
+    assert signals_of(replace(recording, columns=without)) is None
+
+
+def test_the_loop_has_the_gains_of_the_time_by_the_names_of_the_release() -> None:
+    changes = ((15.0, "PSC_ACCZ_P", 0.8),)
+    recording = copter(ardupilot_log(simulated_flight(QUIET), changes=changes))
+    gains = [loop.gains["PSC_ACCZ_P"] for at_s in (15.0, 25.0) if (loop := loop_of(recording, at_s)) is not None]
+    assert gains == pytest.approx([0.5, 0.8])
+    newer = loop_of(copter(ardupilot_log(simulated_flight(QUIET), parameters=NEWER_PARAMETERS)), 20.0)
+    assert newer is not None
+    assert usual_margins(newer, 0.4).sets[0].gains["PSC_D_ACC_P"] == pytest.approx(0.05)
+
+
+def test_there_is_no_loop_without_its_gains_or_with_what_a_replica_lacks() -> None:
+    flight = simulated_flight(QUIET)
+    without = {name: value for name, value in PARAMETERS.items() if name != "PSC_ACCZ_I"}
+    for parameters in (without, {**PARAMETERS, "PSC_ACCZ_SMAX": 5.0}):
+        assert loop_of(copter(ardupilot_log(flight, parameters=parameters)), 20.0) is None
+
+
+def test_margins_on_the_usual_copter_fall_with_the_gains_and_rise_with_the_hover_throttle() -> None:
+    """All feedback passes through the gains over hover throttle, so that the margin is about proportional to it."""
+    loop = loop_of(copter(ardupilot_log(simulated_flight(QUIET))), 20.0)
+    assert loop is not None
+    light, heavy = (usual_margins(loop, hover) for hover in (0.2, 0.4))
+    assert light.sets[0].name == "As flown"
+    assert heavy.sets[0].margin == pytest.approx(2.0 * light.sets[0].margin, rel=0.1)
+    stiff = next(each for each in heavy.sets if each.gains["PSC_ACCZ_P"] == 1.0)
+    assert stiff.margin < heavy.sets[0].margin
