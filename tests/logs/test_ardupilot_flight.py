@@ -2,7 +2,7 @@
 
 import io
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +13,7 @@ from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.logged_flight import ardupilot_flight
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.core.analysis.loop import LoggedFlight
+from app.core.analysis.segment import Segment
 from app.core.errors import InputError, TrajectoryError
 from app.core.records.trajectory import Samples
 from tests.core.analysis.flights import GUSTY, simulated_flight
@@ -275,6 +276,13 @@ def test_a_hundred_rows_a_second_are_thinned_to_ten() -> None:
 def test_an_older_release_without_the_shaped_altitude_is_read_by_its_target() -> None:
     older, newer = (read(ardupilot_log(gusty(), has_shaped_altitude=each)) for each in (False, True))
     assert older.segments[0].z_d_m == pytest.approx(newer.segments[0].z_d_m)
+
+
+def test_release_4_1_logs_the_same_loop_positive_up() -> None:
+    older, newer = (read(ardupilot_log(gusty(), is_upward=each)) for each in (True, False))
+    for each in fields(Segment):
+        assert getattr(older.segments[0], each.name) == pytest.approx(getattr(newer.segments[0], each.name)), each.name
+    assert refusal(ardupilot_log(gusty(), is_upward=True).replace(b",TVZ", b",XVZ")) == ("PSCD.TVD", "column_missing")
 
 
 def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_named() -> None:

@@ -46,21 +46,23 @@ def ardupilot_log(
     changes: Sequence[tuple[float, str, float]] = (),
     rows: slice = slice(None),
     has_shaped_altitude: bool = True,
+    is_upward: bool = False,
     attitude: Sequence[tuple[float, float, float]] = (),
     errors: Sequence[tuple[float, int, int]] = (),
     without_throttle_s: tuple[float, float] = (0.0, 0.0),
 ) -> bytes:
     """The first segment of the flight, which begins at `begin_s` after takeoff; times of modes, events, errors, roll
     and pitch (degrees) and parameter changes count from the takeoff, at 5 s of the vehicle's clock. Older releases
-    have no shaped altitude beside the target."""
+    have no shaped altitude beside the target, and 4.1 logs the loop as PSCZ, which `is_upward`."""
     log = OnBoardLog()
     log.define(PARM, "PARM", "QNf", "TimeUS,Name,Value")
     log.define(MODE, "MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn")
     log.define(EV, "EV", "QB", "TimeUS,Id")
     log.define(ATT, "ATT", "Qff", "TimeUS,Roll,Pitch")
     log.define(ERR, "ERR", "QBB", "TimeUS,Subsys,ECode")
-    columns = ("DPD", "TPD", "PD", "DVD", "TVD", "VD", "DAD", "TAD", "AD")[not has_shaped_altitude :]
-    log.define(PSCD, "PSCD", "Q" + len(columns) * "f", ",".join(("TimeUS", *columns)))
+    columns = ("DPD", "TPD", "PD", "DVD", "TVD", "VD", "DAD", "TAD", "AD")[is_upward or not has_shaped_altitude :]
+    named = [f"{each[:-1]}Z" for each in columns] if is_upward else columns
+    log.define(PSCD, "PSCZ" if is_upward else "PSCD", "Q" + len(columns) * "f", ",".join(("TimeUS", *named)))
     log.define(CTUN, "CTUN", "Qfff", "TimeUS,ThI,ThO,ThH")
     messages: list[tuple[int, int, str, Sequence[float | bytes]]] = []
     messages += [(0, PARM, "<Q16sf", (name.encode(), value)) for name, value in parameters.items()]
@@ -72,7 +74,8 @@ def ardupilot_log(
     segment = flight.segments[0]
     for row in range(*rows.indices(len(segment.time_s))):
         at_us = _us(begin_s + float(segment.time_s[row] - segment.time_s[0]))
-        loop = tuple(-float(values[row]) for values in _loop(segment))[-len(columns) :]
+        sign = 1.0 if is_upward else -1.0
+        loop = tuple(sign * float(values[row]) for values in _loop(segment))[-len(columns) :]
         messages.append((at_us, PSCD, f"<Q{len(columns)}f", loop))
         throttle = (float(segment.throttle[row]), float(segment.throttle_filtered[row]))
         if _us(without_throttle_s[0]) < at_us < _us(without_throttle_s[1]):

@@ -40,6 +40,16 @@ LOOP: Final[Mapping[str, Source]] = {
 }
 """The vertical controller's own message. The desired motion is shaped: releases before 4.6 log its altitude as the
 reference."""
+_UPWARD: Final[Mapping[str, Source]] = {
+    "altitude_m": Source("PSCZ", "PZ"),
+    "climb_rate_m_s": Source("PSCZ", "VZ"),
+    "acceleration_m_s2": Source("PSCZ", "AZ"),
+    "desired_climb_rate_m_s": Source("PSCZ", "DVZ"),
+    "desired_acceleration_m_s2": Source("PSCZ", "DAZ"),
+    "climb_rate_target_m_s": Source("PSCZ", "TVZ"),
+    "reference_m": Source("PSCZ", "TPZ"),
+}
+"""The same in release 4.1, positive up."""
 TERMS: Final = ("P", "I", "D", "FF", "DFF")
 """Of the acceleration controller, in ‰ of throttle."""
 NOT_POSITION: Final = ("Terrain", "vX", "vY", "vZ", "aX", "aY", "aZ")
@@ -61,7 +71,7 @@ _ROWS: Final[Mapping[str, tuple[Collection[str], int]]] = {"BAT": (("Inst", "Ins
 """The first battery, and the failsafe for vibration, which replaces the loop."""
 _WITHOUT_LOOP: Final = {"altitude_m": Source("CTUN", "Alt"), "reference_m": Source("CTUN", "DAlt")}
 _WANTED: Final = frozenset(
-    {"PARM", "MAVC", "EV", "MSG", "PSCZ", *(each.message for each in (*LOOP.values(), *_BESIDE.values()))}
+    {"PARM", "MAVC", "EV", "MSG", *(each.message for each in (*LOOP.values(), *_UPWARD.values(), *_BESIDE.values()))}
 )
 
 _ACCEPTED: Final = (0, 5)
@@ -90,8 +100,8 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
         raise refused("has no message with the time (TimeUS or TimeMS)", _NO_CLOCK_HINT)
     tables = log.tables | {name: _only(log.tables[name], *which) for name, which in _ROWS.items() if name in log.tables}
     tables["MODE"] = _with_numbers(tables.get("MODE", {}))
-    has_loop = {CLOCK, "PD"} <= tables.get("PSCD", {}).keys()
-    sources = {**LOOP, **_BESIDE, **({} if has_loop else _WITHOUT_LOOP)}
+    loop = next((each for each in (LOOP, _UPWARD) if _is_logged(each["altitude_m"], tables)), {**LOOP, **_WITHOUT_LOOP})
+    sources = {**loop, **_BESIDE}
     columns = columns_of(tables, {name: _in_si(each, log.factors) for name, each in sources.items()}, clock=CLOCK)
     columns |= {name: _until_restart(columns[name], log.boots_s) for name in _UNTIL_RESTART if name in columns}
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
@@ -127,6 +137,10 @@ def _events(tables: Mapping[str, Table], boots_s: Sequence[float]) -> Iterator[E
     for time_s, event in rows_of(tables.get("EV", {}), CLOCK, "Id"):
         if event in _EVENTS:
             yield Event(_EVENTS[event][0], time_s, _EVENTS[event][1])
+
+
+def _is_logged(source: Source, tables: Mapping[str, Table]) -> bool:
+    return {CLOCK, source.field} <= tables.get(source.message, {}).keys()
 
 
 def _in_si(source: Source, factors: Mapping[str, Mapping[str, float]]) -> Source:

@@ -210,8 +210,8 @@ def _require_messages(recording: Recording, refused: Refused) -> None:
         raise refused(Reason(code=ReasonCode.NO_DATA))
     if frame := frame_of(recording):
         raise refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
-    found = {column.source for column in recording.columns.values()}
-    absent = [name for name, source in LOOP.items() if str(source) not in found]
+    from_loop = {name for name, column in recording.columns.items() if not column.source.startswith("CTUN.")}
+    absent = [name for name in LOOP if name not in from_loop]
     if len(absent) == len(LOOP):
         raise refused(_absent(recording, "PSCD", "NTUN"))
     if absent and absent not in _ONE_OF_TWO:
@@ -226,5 +226,5 @@ def _absent(recording: Recording, message: str, bit: str) -> Reason:
     would_be_logged = "LOG_BITMASK" in latest and not latest.keys() & _UNTIL_4_0
     if would_be_logged and not int(latest["LOG_BITMASK"]) & _LOG_BITS[bit]:
         return Reason(code=ReasonCode.LOG_BIT_UNSET, field=message, named=[bit])
-    is_otherwise = message in recording.sources or "PSCZ" in recording.sources
-    return Reason(code=ReasonCode.COLUMN_MISSING if is_otherwise else ReasonCode.MESSAGE_MISSING, field=message)
+    is_logged = message in recording.sources
+    return Reason(code=ReasonCode.COLUMN_MISSING if is_logged else ReasonCode.MESSAGE_MISSING, field=message)
