@@ -101,14 +101,3 @@ def test_there_is_no_loop_without_its_gains_or_with_what_a_replica_lacks() -> No
     without = {name: value for name, value in PARAMETERS.items() if name != "PSC_ACCZ_I"}
     for parameters in (without, {**PARAMETERS, "PSC_ACCZ_SMAX": 5.0}):
         assert loop_of(copter(ardupilot_log(flight, parameters=parameters)), 20.0) is None
-
-
-def test_margins_on_the_usual_copter_fall_with_the_gains_and_rise_with_the_hover_throttle() -> None:
-    """All feedback passes through the gains over hover throttle, so that the margin is about proportional to it."""
-    loop = loop_of(copter(ardupilot_log(simulated_flight(QUIET))), 20.0)
-    assert loop is not None
-    light, heavy = (usual_margins(loop, hover) for hover in (0.2, 0.4))
-    assert light.sets[0].name == "As flown"
-    assert heavy.sets[0].margin == pytest.approx(2.0 * light.sets[0].margin, rel=0.1)
-    stiff = next(each for each in heavy.sets if each.gains["PSC_ACCZ_P"] == 1.0)
-    assert stiff.margin < heavy.sets[0].margin

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.analysis.analysis import Analysis, analyze
+from app.core.analysis.analysis import Analysis, Grade, analyze
 from app.core.analysis.hover import advise_hover
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
@@ -69,7 +69,7 @@ def test_too_much_gust_for_the_slope_says_what_to_fly() -> None:
     found = analyze(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3))
     assert found.proposed is None
     assert found.why_none is not None
-    assert found.why_none.code.key == "slope_unknown"
+    assert (found.grade, found.why_none.code.key) == (Grade.PARTIAL, "slope_unknown")
     assert found.why_none.numbers["thrust_slope_deviation"] > 0.15
     assert "climb 2 m" in found.answer
 

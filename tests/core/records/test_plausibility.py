@@ -163,3 +163,17 @@ def test_steps_may_begin_in_hover(experiment: str, begin_s: float) -> None:
 def test_only_flights_to_a_height_are_checked() -> None:
     checked = {name for name in EXPERIMENTS if get_experiment(name).expected is not None}
     assert checked == set(EXPERIMENTS) - {"pitch-tracking"}
+
+
+def test_a_finding_is_a_sentence_with_its_value_and_limit() -> None:
+    (found,) = find_implausible(expected_of(), record(FLOWN_M - 0.4))
+    assert found.sentence == "it begins at −0.40 m, not within 0.3 m of the ground"
+
+
+def test_a_record_that_is_read_as_it_is_stays_the_same() -> None:
+    flown = record()
+    assert read_as(flown, ()) is flown
+
+
+def test_a_record_without_samples_where_it_is_scored_is_left_to_scoring() -> None:
+    assert find_implausible(expected_of(), record(FLOWN_M[:40], TIME_S[:40])) == ()
