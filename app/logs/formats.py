@@ -25,7 +25,7 @@ class Format(StrEnum):
     GROUND_LOG = ".data"
     GZIP = ".gz"
     ZIP = ".zip"
-    SDLOG2 = ".px4log"
+    SDLOG2 = "sdlog2"
     DATAFLASH_TEXT = ".log"
     ZEROS = "zeros"
 
