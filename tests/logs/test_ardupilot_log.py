@@ -11,7 +11,7 @@ from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.replay import LoopLog
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
 from app.core.errors import InputError
-from tests.logs.recorded import recorded
+from tests.logs.recorded import OnBoardLog, recorded
 
 LOG = recorded("arducopter_steps.bin")
 
@@ -80,3 +80,22 @@ def test_a_log_that_cannot_be_compared_is_refused_by_what_is_missing(
     with pytest.raises(InputError) as refusal:
         read(*renamed)
     assert problem in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("banner", "firmware", "release"),
+    [
+        (b"ArduCopter V4.5.7 (0358a9c2)", "", "4.5.7"),
+        (b"ArduCopter V4.1.0-dev (0b517cfc)", "", "4.1.0-dev"),
+        (b"APM:Copter V3.4.4-rc1 (c0ffee00)", "", "3.4.4-rc1"),
+        (b"ArduPlane V4.5.7 (0358a9c2)", "ArduPlane", "4.5.7"),
+        (b"Frame: QUAD/X", "", ""),
+    ],
+)
+def test_the_firmware_and_its_release_are_those_of_the_banner(banner: bytes, firmware: str, release: str) -> None:
+    log = OnBoardLog()
+    log.define(1, "MSG", "QZ", "TimeUS,Message")
+    for message in (b"RC Protocol: SITL", banner):
+        log.add(1, "<Q64s", 0, message)
+    found = read_ardupilot(io.BytesIO(log.content))
+    assert (found.firmware, found.release) == (firmware, release)

@@ -90,7 +90,10 @@ _MODES_AS_TEXT: Final = {name.replace("_", "").encode(): number for number, name
 _UNTIL_RESTART: Final = ("mode", "vibration_failsafe")
 """States that a vehicle that starts anew reports only as they change."""
 _NO_CLOCK_HINT: Final = "Releases of ArduCopter before 3.1 log no time: use a log of a newer one."
-_OTHER_FIRMWARE: Final = re.compile(rb"(ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V\d")
+_BANNER: Final = re.compile(
+    rb"(APM:Copter|ArduCopter|ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V(\d[\w.-]*)"
+)
+_COPTERS: Final = ("APM:Copter", "ArduCopter")
 
 
 def read_ardupilot(stream: BinaryIO) -> Recording:
@@ -105,10 +108,12 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
     columns = columns_of(tables, {name: _in_si(each, log.factors) for name, each in sources.items()}, clock=CLOCK)
     columns |= {name: _until_restart(columns[name], log.boots_s) for name in _UNTIL_RESTART if name in columns}
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
+    firmware, release = _firmware(tables)
     return Recording(
         title=f"ArduPilot's on-board log, altitude from {altitude}",
         autopilot=ARDUPILOT,
-        firmware=_other_firmware(tables),
+        firmware=firmware,
+        release=release,
         columns=columns,
         sources=list(log.tables),
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
@@ -170,8 +175,10 @@ def _only(table: Table, columns: Collection[str], value: int) -> Table:
     return table if found is None else {name: values[found == value] for name, values in table.items()}
 
 
-def _other_firmware(tables: Mapping[str, Table]) -> str:
-    """The firmware of another kind of vehicle that tells its version in a message; empty if none does."""
+def _firmware(tables: Mapping[str, Table]) -> tuple[str, str]:
+    """The firmware, if it is that of another kind of vehicle, and its release, as it tells them in a message; empty if
+    none does."""
     messages = tables.get("MSG", {}).get("Message", np.empty(0, "S64")).tolist()
-    found = (_OTHER_FIRMWARE.match(each) for each in messages if isinstance(each, bytes))
-    return next((each[1].decode() for each in found if each), "")
+    banners = (_BANNER.match(each) for each in messages if isinstance(each, bytes))
+    name, release = next((each.groups() for each in banners if each), (b"", b""))
+    return "" if name.decode() in _COPTERS else name.decode(), release.decode()
