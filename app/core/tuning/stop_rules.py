@@ -52,13 +52,14 @@ TUNE_FIRST: Final = (
 class StopVerdict:
     """Whether to stop, and why.
 
-    `why` is a sentence in both cases. `threshold` is the error that the next flight must stay below to count as an
-    improvement.
+    `why` is a sentence in both cases. `failures` counts the scored flights in a row, up to the last, without enough
+    improvement; `threshold` is the error that the next flight must stay below to count as an improvement.
     """
 
     stop: bool
     reason: Reason | None
     why: str
+    failures: int
     threshold: float | None
 
 
@@ -158,6 +159,7 @@ def decide_stop(
         stop=reason is not None,
         reason=reason,
         why=why,
+        failures=failures,
         threshold=None if best is None or rule.kind == "noise" else (1.0 - rule.improvement) * best,
     )
 
