@@ -59,7 +59,10 @@ def loop_of(recording: Recording, at_s: float) -> AltitudeLoop | None:
     given: dict[str, float] = {}
     for each in sorted(recording.settings, key=lambda setting: setting.time_s):
         name, value = in_older_names(each.name, each.value)
-        given = {**given, name: value} if each.time_s <= at_s else {name: value, **given}
+        if each.time_s <= at_s:
+            given[name] = value
+        else:
+            given.setdefault(name, value)
     try:
         loop = _LOOPS[recording.autopilot.name](recording, given)
     except (KeyError, InputError):
