@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from app.logs.base import HEAD_BYTES, Contents, Table, numbers, rows_of
 from app.logs.boots import CLOCK, Placed, Places, on_one_clock
-from app.logs.dataflash_text import SCALES, as_binary, is_dataflash_text
+from app.logs.dataflash_text import SCALES, SYNC, as_binary, is_dataflash_text
 
-_SYNC: Final = b"\xa3\x95"
 _HEADER_BYTES: Final = 3
 _LARGEST_BYTES: Final = 255
 _FMT: Final = 128
@@ -55,11 +54,11 @@ _SHARES: Final = {ord("%"): 1e-2}
 def is_dataflash(head: bytes) -> bool:
     """Whether a file with this head is a DataFlash log: it begins with a message that describes a type, or somewhere in
     one: messages of a type are equally long."""
-    marks = pairwise(found.start() for found in re.finditer(_SYNC, head))
-    lengths = Counter((head[first + len(_SYNC)], after - first) for first, after in marks)
+    marks = pairwise(found.start() for found in re.finditer(SYNC, head))
+    lengths = Counter((head[first + len(SYNC)], after - first) for first, after in marks)
     usual = {number: count for (number, _), count in reversed(lengths.most_common())}
     is_regular = sum(usual.values()) > max(_FEWEST_MESSAGES, _USUAL_SHARE * lengths.total())
-    return is_regular or head.startswith(_SYNC + bytes([_FMT]))
+    return is_regular or head.startswith(SYNC + bytes([_FMT]))
 
 
 def is_sdlog2(head: bytes) -> bool:
@@ -176,17 +175,17 @@ def _messages(content: NDArray[np.uint8], kinds: Sequence[_Kind]) -> Iterator[tu
     lengths, numbers_of = (np.array([getattr(kind, name) for kind in kinds]) for name in ("length", "number"))
     since = np.array([(kind.number << 32) + kind.since for kind in kinds])
     for begin in range(0, max(size, 1), _AT_ONCE):
-        part = content[begin : begin + _AT_ONCE + len(_SYNC)]
-        marks = np.flatnonzero(part[:-2] == _SYNC[0])
-        places = begin + marks[part[marks + 1] == _SYNC[1]]
-        types = content[places + len(_SYNC)].astype(np.int64)
+        part = content[begin : begin + _AT_ONCE + len(SYNC)]
+        marks = np.flatnonzero(part[:-2] == SYNC[0])
+        places = begin + marks[part[marks + 1] == SYNC[1]]
+        types = content[places + len(SYNC)].astype(np.int64)
         which = np.searchsorted(since, (types << 32) + places, side="right") - 1
         is_known = numbers_of[which] == types
         places, which = places[is_known], which[is_known]
         ends = places + lengths[which]
-        after = np.minimum(ends, size - len(_SYNC))
-        is_whole = (content[after] == _SYNC[0]) & (content[after + 1] == _SYNC[1]) & (after == ends)
-        is_whole |= (ends > size - len(_SYNC)) & (ends <= size)
+        after = np.minimum(ends, size - len(SYNC))
+        is_whole = (content[after] == SYNC[0]) & (content[after + 1] == SYNC[1]) & (after == ends)
+        is_whole |= (ends > size - len(SYNC)) & (ends <= size)
         reached = np.maximum.accumulate(np.append(free_from, np.where(is_whole, ends, 0)))
         free_from, found = int(reached[-1]), is_whole & (places >= reached[:-1])
         yield places[found].astype(np.uint32), which[found].astype(np.int16)

@@ -14,7 +14,8 @@ from app.logs.base import Contents
 
 SCALES: Final[Mapping[str, float]] = MappingProxyType({**dict.fromkeys("cCeE", 1e-2), "L": 1e-7})
 """Of integers, by the letter of their column."""
-_SYNC: Final = b"\xa3\x95"
+SYNC: Final = b"\xa3\x95"
+"""Begins every binary message."""
 _FMT: Final = b"FMT"
 _DESCRIPTION: Final = re.compile(rb"^FMT, *\d+, *\d+, *\w{1,4}, *[A-Za-z]+, *\w+ *(,|$)", re.MULTILINE)
 _LINE: Final = re.compile(rb"[^\r\n]+")
@@ -54,14 +55,14 @@ def _described(values: bytes, kinds: dict[bytes, _Kind]) -> bytes:
     known = "".join(each if each in _LAYOUTS else "N" for each in letters.decode("ascii"))
     kinds[name] = bytes([int(number)]), known, struct.Struct("<" + "".join(_LAYOUTS[each] for each in known))
     described = int(number), 3 + kinds[name][-1].size, name, known.encode(), b",".join(columns)
-    return struct.pack("<3sBB4s16s64s", _SYNC + b"\x80", *described)
+    return struct.pack("<3sBB4s16s64s", SYNC + b"\x80", *described)
 
 
 def _message(values: bytes, number: bytes, letters: str, layout: struct.Struct) -> bytes:
     """A message with these values, of which the last may contain commas if it is a text."""
     cells = values.split(b",", len(letters) - (letters[-1:] in _TEXTS))
     packed = layout.pack(*(_value(letter, cell.strip()) for letter, cell in zip(letters, cells, strict=True)))
-    return _SYNC + number + packed
+    return SYNC + number + packed
 
 
 def _value(letter: str, cell: bytes) -> float | bytes:
