@@ -283,7 +283,7 @@ def analyze(
 ) -> None:
     """Propose better altitude gains from a flight log, and print what the model predicts for them; and say how well the
     replica of the autopilot's vertical loop explains it."""
-    from app.cli.files import analyze_log
+    from app.cli.log_analysis import analyze_log
 
     analyze_log(log, gains=gains, vehicle=vehicle, json_out=json_out, params_out=params)
 

@@ -1,6 +1,4 @@
-"""`gainline import`, `analyze`, `report`, `bundle`, `unbundle`: flight logs in, what the model says of one, reports
-out, and whole campaigns in and out.
-"""
+"""`gainline import`, `report`, `bundle`, `unbundle`: flight logs in, reports out, and whole campaigns in and out."""
 
 import sys
 from collections.abc import Iterator, Mapping
@@ -20,14 +18,13 @@ from app.campaigns import service as campaigns
 from app.campaigns.trials import records
 from app.campaigns.trials.record_doubts import Accepted
 from app.campaigns.trials.schemas import Trial
-from app.cli.console import console, reading, table, write_json, writing
+from app.cli.console import console, reading, write_json, writing
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
-from app.core.analysis.analysis import Grade
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.log_analyses.schemas import PartTexts, Refusal
+from app.logs.formats import companion_of
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
@@ -79,12 +76,6 @@ def can_ask() -> bool:
     return sys.stdin.isatty()
 
 
-def companion_of(file: Path) -> Path | None:
-    """The .log file beside Paparazzi's .data file, which has its messages and gains; None if there is none."""
-    beside = file.with_suffix(".log")
-    return beside if file.suffix.lower() == ".data" and beside.is_file() else None
-
-
 def _read(file: Path, takeoff: int | None) -> Takeoff:
     from app.autopilots.log_readers import read_takeoff  # noqa: PLC0415 - imports every reader
 
@@ -111,57 +102,6 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
             question = "Import it?" if accepted.reads_as == before.reads_as else "Import it, read so?"
             if not yes and not typer.confirm(question):
                 raise
-
-
-def analyze_log(file: Path, *, gains: str, vehicle: int | None, json_out: Path | None, params_out: Path | None) -> None:
-    """Print the analysis of a log, and write it and the proposed parameters where asked for.
-
-    Raises InputError for a file that cannot be read, and for a parameter file where nothing is proposed; exits with 1
-    for a log that answers nothing.
-    """
-    from app.log_analyses.content import ANALYSED, analyze_content  # noqa: PLC0415 - imports every reader
-
-    with reading(file, ANALYSED):
-        beside = companion_of(file)
-        content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
-    answer, _ = analyze_content(content, companion, file.name, gains, vehicle)
-    out = console(json_out)
-    about = [each for each in (answer.autopilot, answer.release, answer.frame) if each]
-    out.print(f"[bold]{escape(answer.file_name)}[/] ({escape(', '.join(about))})")
-    is_refused, is_compared = answer.tuning.grade is Grade.REFUSED, not isinstance(answer.replica, Refusal)
-    tuning = (f"Gains ({answer.tuning.grade})", answer.texts.tuning)
-    replica = ("Replica of the controller", answer.texts.replica)
-    for title, texts in (replica, tuning) if is_refused and is_compared else (tuning, replica):
-        _print_part(out, title, texts)
-        out.print()
-    write_json(json_out, answer.model_dump(mode="json"))
-    if params_out is not None:
-        _write_parameters(params_out, answer.texts.tuning)
-    if is_refused and not is_compared:
-        raise typer.Exit(1)
-
-
-def _print_part(out: Console, title: str, texts: PartTexts) -> None:
-    out.print(escape(f"{title}: {texts.answer}"))
-    for reason in texts.reasons:
-        out.print(escape(f"  {reason}"))
-    for facts in texts.facts:
-        out.print(escape(f"{facts.title}: {', '.join(facts.values)}."))
-    if texts.table is not None:
-        out.print(table(texts.table.columns, texts.table.rows, title=texts.table.title))
-    for note in texts.notes:
-        out.print(escape(note), style="dim")
-
-
-def _write_parameters(target: Path, texts: PartTexts) -> None:
-    if texts.parameter_file is None:
-        raise InputError(
-            "No parameter file was written, because nothing is proposed.",
-            hint=texts.answer,
-            problems=(Problem("--params", "has nothing to write"),),
-        )
-    with writing("--params", target):
-        target.write_text(texts.parameter_file.content, encoding="utf-8")
 
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:

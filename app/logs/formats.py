@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from enum import StrEnum
 from operator import methodcaller
+from pathlib import Path
 from typing import BinaryIO, Final
 
 from app.logs.base import HEAD_BYTES
@@ -60,3 +61,9 @@ _KINDS: Final[tuple[tuple[Format, Callable[[bytes], bool]], ...]] = (
 def recognise(head: bytes) -> Format | None:
     """The format of a file with these first bytes; None if it is none of these."""
     return next((kind for kind, is_kind in _KINDS if is_kind(head)), None)
+
+
+def companion_of(file: Path) -> Path | None:
+    """The .log file beside Paparazzi's .data file, which has its messages and gains; None if there is none."""
+    beside = file.with_suffix(".log")
+    return beside if file.suffix.lower() == ".data" and beside.is_file() else None
