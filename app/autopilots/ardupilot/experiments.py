@@ -272,7 +272,7 @@ def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: FlownStep
     z_d, v_d, a_d = (np.interp(rows_s, steps_s, reference[:, column]) for column in range(3))
     demanded = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
     gain = low_pass_gain(vertical.THROTTLE_FILTER_HZ, loop.step_s)
-    sent = filtered(demanded, (np.array([gain]), np.array([1.0, gain - 1.0])))
+    sent = filtered(demanded, (np.array([gain, 0.0]), np.array([1.0, gain - 1.0])))
     scored = (trajectory.time_s >= steps.begin_s) & (trajectory.time_s <= steps.end_s)
     moved = trajectory["throttle"] - np.interp(trajectory.time_s, steps_s, sent)
     return LoggedFlight(

@@ -139,11 +139,10 @@ def find_oscillation(time_s: Samples, deviation_m: Samples, reference_m: Samples
     The spectrum is that of the rate, in which gusts and the ends of altitude changes are about even.
     """
     from scipy.ndimage import median_filter, uniform_filter1d
-    from scipy.signal import detrend
 
     step_s, window = float(time_s[1] - time_s[0]), np.hanning(len(time_s))
     frequency_hz = np.fft.rfftfreq(len(time_s), step_s)
-    spectra = [np.abs(np.fft.rfft(window * detrend(each))) for each in (deviation_m, reference_m)]
+    spectra = [np.abs(np.fft.rfft(window * _detrended(time_s, each))) for each in (deviation_m, reference_m)]
     power = (frequency_hz * spectra[0]) ** 2
     counted = frequency_hz >= max(_SLOWEST_HZ, _LEAST_PERIODS / (time_s[-1] - time_s[0]))
     above = np.where(counted, power / np.maximum(median_filter(power, _BESIDE), np.finfo(float).tiny), 0.0)
@@ -152,10 +151,15 @@ def find_oscillation(time_s: Samples, deviation_m: Samples, reference_m: Samples
         return None
     left, middle, right = np.log(spectra[0][line - 1 : line + 2])
     at_hz = float(frequency_hz[line] + frequency_hz[1] * 0.5 * (left - right) / (left - 2.0 * middle + right))
-    turned = detrend(deviation_m) * np.exp(-2j * np.pi * at_hz * time_s)
+    turned = _detrended(time_s, deviation_m) * np.exp(-2j * np.pi * at_hz * time_s)
     envelope_m = 2.0 * np.abs(uniform_filter1d(turned, max(round(_SMOOTHED_PERIODS / at_hz / step_s), 1)))
     oscillates = np.flatnonzero(envelope_m > 0.5 * envelope_m.max())
     if len(oscillates) * step_s * at_hz < _LEAST_PERIODS:
         return None
     amplitude_m = float(np.median(envelope_m[oscillates]))
     return Oscillation(frequency_hz=at_hz, amplitude_m=amplitude_m, since_s=float(time_s[oscillates[0]]))
+
+
+def _detrended(time_s: Samples, values: Samples) -> Samples:
+    """Values less the straight line through them, shape (n,)."""
+    return np.asarray(values - np.polynomial.Polynomial.fit(time_s, values, 1)(time_s))

@@ -202,7 +202,7 @@ def in_order(gains: Mapping[str, float]) -> str:
 def mean_over(row_s: float, step_s: float) -> Filter:
     """The mean over the steps of the row before: the change of the climb rate as an acceleration."""
     steps = max(round(row_s / step_s), 1)
-    return np.append(0.0, np.full(steps, 1.0 / steps)), np.array([1.0])
+    return np.append(0.0, np.full(steps, 1.0 / steps)), np.append(1.0, np.zeros(steps))
 
 
 def transition_of(after_step: Callable[[Samples], Samples], loop_size: int, nudge: float) -> Samples:

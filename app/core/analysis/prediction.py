@@ -11,7 +11,7 @@ and what the accelerometer sensed beside that has no mean over a row.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -108,8 +108,7 @@ class PredictedCurve:
 class _Flown:
     """Error, m, and throttle activity of a copter over all segments, and its altitude in the first one, shape (m,)."""
 
-    error_m: float
-    activity: float
+    score: tuple[float, float]
     altitude_m: Samples
 
 
@@ -125,31 +124,25 @@ class FlightModel:
         ]
         if flight.activity is not None:
             self._runs = [self._as_active(runs, flight.activity) for runs in self._runs]
-        random = np.random.default_rng(_SEED)
-        self._elsewhen = [
-            [replace(run, disturbances=in_other_weather(run.disturbances, random)) for run in runs]
-            for runs in self._runs
-        ]
 
     def fly(self, loop: AltitudeLoop) -> tuple[float, float]:
         """Error, m, and throttle activity in the weather of the flight, means of the copters."""
-        return _means([self._flown(runs, loop) for runs in self._runs])
+        return _means([self._flown(runs, loop).score for runs in self._runs])
 
     def predict(self, loop: AltitudeLoop) -> Prediction:
         """Prediction for a single flight: the disturbances of the interval meet the reference at other times."""
-        return self.predict_curve(loop).prediction
+        return _prediction(
+            *([self._flown(runs, loop).score for runs in every] for every in (self._runs, self._elsewhen()))
+        )
 
     def predict_curve(self, loop: AltitudeLoop) -> PredictedCurve:
         """The same, with what each copter flies."""
-        now, then = ([self._flown(runs, loop) for runs in every] for every in (self._runs, self._elsewhen))
-        error_m, activity = _means(now)
-        elsewhen = np.array([each.error_m for each in then])
-        low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
+        now, then = ([self._flown(runs, loop) for runs in every] for every in (self._runs, self._elsewhen()))
         altitudes = np.array([each.altitude_m for each in now])
         begin_s, step_s = self._flight.segments[0].time_s[0], self._flight.loop.step_s
         return PredictedCurve(
-            prediction=Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity),
-            errors_m=np.array([each.error_m for each in now]),
+            prediction=_prediction([each.score for each in now], [each.score for each in then]),
+            errors_m=np.array([each.score[0] for each in now]),
             time_s=begin_s + step_s * np.arange(altitudes.shape[1]),
             altitudes_m=altitudes,
             elsewhen_m=np.array([each.altitude_m for each in then]),
@@ -163,11 +156,17 @@ class FlightModel:
         place = np.round((time_s - time_s[0]) / self._flight.loop.step_s).astype(np.int64)
         return np.asarray(flown[np.minimum(place, len(flown) - 1)])
 
+    def _elsewhen(self) -> Iterator[list[Run]]:
+        """The runs at another time, the same at every call: kept, they would be most of what an analysis keeps."""
+        random = np.random.default_rng(_SEED)
+        for runs in self._runs:
+            yield [replace(run, disturbances=in_other_weather(run.disturbances, random)) for run in runs]
+
     def _as_active(self, runs: Sequence[Run], activity: float) -> list[Run]:
         """The runs with the noise of the sensed acceleration that moves the throttle as much as in the flight."""
         loop = self._flight.loop
         calm, noisy = ([_with_noise(run, loop, deviation) for run in runs] for deviation in (0.0, 1.0))
-        without, moved = (self._flown(each, loop).activity ** 2 for each in (calm, noisy))
+        without, moved = (self._flown(each, loop).score[1] ** 2 for each in (calm, noisy))
         variance = (activity**2 - without) / (moved - without)
         return [_with_noise(run, loop, math.sqrt(max(variance, 0.0))) for run in runs]
 
@@ -177,17 +176,25 @@ class FlightModel:
         deviations, fast, altitudes = [], [], []
         for run in runs:
             whole = loop.fly(run)
-            altitudes.append(whole[:, FLOWN.index("z_m")])
+            altitudes.append(whole[:, FLOWN.index("z_m")].copy())
             flown = whole[lead:]
             deviations.append(np.abs(run.reference[lead:, 0] - flown[:, 0]))
             fast.append(flown[:, FLOWN.index("throttle")] - flown[:, FLOWN.index("throttle_slow")])
-        return _Flown(float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std()), altitudes[0])
+        return _Flown((float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std())), altitudes[0])
 
 
-def _means(flown: Sequence[_Flown]) -> tuple[float, float]:
+def _means(scores: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Mean error, m, and throttle activity of copters."""
-    error_m, activity = np.mean([(each.error_m, each.activity) for each in flown], axis=0).tolist()
+    error_m, activity = np.mean(scores, axis=0).tolist()
     return error_m, activity
+
+
+def _prediction(now: Sequence[tuple[float, float]], then: Sequence[tuple[float, float]]) -> Prediction:
+    """Of error, m, and throttle activity of each copter in the weather of the flight and at another time."""
+    error_m, activity = _means(now)
+    elsewhen = np.array(then)[:, 0]
+    low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
+    return Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity)
 
 
 def _with_noise(run: Run, loop: AltitudeLoop, deviation_m_s2: float) -> Run:

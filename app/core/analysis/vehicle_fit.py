@@ -19,7 +19,7 @@ import numpy as np
 
 from app.core.analysis.loop import AltitudeLoop, LoggedFlight
 from app.core.analysis.segment import Segment, interpolated
-from app.core.models.copter import GRAVITY_M_S2, Copter, filtered, motor_filter
+from app.core.models.copter import GRAVITY_M_S2, Copter, filtered, motor_filter, passed
 from app.core.records.trajectory import Samples
 
 USUAL_DRAG_1_S: Final = (0.3, 0.3)
@@ -30,7 +30,9 @@ _LAGS_S: Final = np.linspace(0.0, 0.25, 26)
 _ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
 _FREE_FALL: Final = -0.95
 _LEAST_THROTTLE: Final = 0.01
-_DRAWS_LOG2: Final = 5
+_DRAWS: Final = 32
+_GENERATOR: Final = (1, 7, 9, 15)
+"""Of a lattice of so many points with even margins, whose normal scores correlate least."""
 _INSTRUMENT_ROWS: Final = 4
 _FEW: Final = 5
 
@@ -61,16 +63,19 @@ class _Noise:
 
     def whitened(self, values: Samples) -> Samples:
         """Rows, shape (n, …), without the correlation of this noise."""
-        from scipy.signal import lfilter
-
-        return np.asarray(lfilter([1.0, -self.decay], [1.0, -self.smoothing], values, axis=0))
+        return _filtered(values, -self.decay, -self.smoothing)
 
     def covariance(self, values: Samples) -> Samples:
         """Covariance of the products of `values`, shape (n, k), with such noise of unit innovations, (k, k)."""
-        from scipy.signal import lfilter
-
-        coloured = np.asarray(lfilter([1.0, -self.smoothing], [1.0, -self.decay], values[::-1], axis=0))
+        coloured = _filtered(values[::-1], -self.smoothing, -self.decay)
         return np.asarray(coloured.T @ coloured)
+
+
+def _filtered(values: Samples, before: float, behind: float) -> Samples:
+    """Rows, shape (n, …), from nothing through a first-order filter with these shares of the row before."""
+    filter_ = np.array([1.0, before]), np.array([1.0, behind])
+    columns = [passed(each, *filter_, np.zeros(1)) for each in np.ascontiguousarray(values.reshape(len(values), -1).T)]
+    return np.column_stack(columns).reshape(values.shape)
 
 
 _NOISES: Final = [
@@ -138,8 +143,6 @@ class _Regression:
 
 def fit_copter(*flights: LoggedFlight) -> CopterEstimate:
     """Estimate the copter from all scored rows of its flights under one autopilot, at least one; deterministic."""
-    from scipy.stats import norm
-
     loop = flights[0].loop
     parts = [
         _Part(flight, segment, *flight.loop.excitation(segment, flight.throttle_mean))
@@ -150,7 +153,10 @@ def fit_copter(*flights: LoggedFlight) -> CopterEstimate:
     best = min(candidates, key=lambda each: each.variance)
     variance = best.independent_variance(max(_NOISES, key=best.log_likelihood))
     regressions = [_regress(each, variance, loop) for each in candidates]
-    log_weight = np.array([each.log_likelihood + norm.logpdf(each.lag_s, *USUAL_LAG_S) for each in regressions])
+    usual_s, deviation_s = USUAL_LAG_S
+    log_weight = np.array(
+        [each.log_likelihood - 0.5 * ((each.lag_s - usual_s) / deviation_s) ** 2 for each in regressions]
+    )
     weight = np.exp(log_weight - log_weight.max())
     values = _draws(regressions, weight / weight.sum())
     return CopterEstimate(
@@ -217,14 +223,14 @@ def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Sa
 
 
 def _draws(regressions: Sequence[_Regression], weight: Samples) -> Samples:
-    """Equally probable copters, shape (2^k, 4): slope, drag, hover throttle, lag."""
-    from scipy.stats import norm, qmc
+    """Equally probable copters, shape (k, 4): slope, drag, hover throttle, lag."""
+    from scipy.special import ndtri
 
-    quantiles = qmc.Sobol(4, rng=np.random.default_rng(1)).random_base2(_DRAWS_LOG2)
+    quantiles = (np.arange(_DRAWS)[:, None] * _GENERATOR % _DRAWS + 0.5) / _DRAWS
     rows = []
     for lag_quantile, *others in quantiles:
         regression = regressions[int(np.searchsorted(np.cumsum(weight), lag_quantile))]
-        slope, drag, constant = regression.mean + np.linalg.cholesky(regression.covariance) @ norm.ppf(others)
+        slope, drag, constant = regression.mean + np.linalg.cholesky(regression.covariance) @ ndtri(others)
         slope = max(slope, 0.2)
         rows.append((slope, max(-drag * GRAVITY_M_S2, 0.0), math.exp(-constant / slope), regression.lag_s))
     return np.array(rows)

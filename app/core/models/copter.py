@@ -82,17 +82,29 @@ def accelerometer_filter(cutoff_hz: float, dt_s: float) -> Filter:
 def motor_filter(lag_s: float, dt_s: float) -> Filter:
     """The first-order lag of the motors."""
     gain = dt_s / (dt_s + lag_s)
-    return np.array([gain]), np.array([1.0, gain - 1.0])
+    return np.array([gain, 0.0]), np.array([1.0, gain - 1.0])
 
 
 def filtered(values: Samples, *filters: Filter) -> Samples:
     """Values behind filters that were at rest at the first one, shape (n,)."""
-    from scipy.signal import lfilter, lfilter_zi
-
     for numerator, denominator in filters:
-        at_rest = lfilter_zi(numerator, denominator) * values[0]
-        values = np.asarray(lfilter(numerator, denominator, values, zi=at_rest)[0])
+        beyond = numerator[1:] - numerator[0] * denominator[1:]
+        at_rest = np.cumsum(denominator)[:-1] * beyond.sum() / denominator.sum()
+        at_rest[1:] -= np.cumsum(beyond)[:-1]
+        values = passed(values, numerator, denominator, at_rest * values[0])
     return values
+
+
+@kernel
+def passed(values: Samples, numerator: Samples, denominator: Samples, memory: Samples) -> Samples:
+    """Values behind a filter, shape (n,), in its transposed direct form II with this memory, (k - 1,)."""
+    behind, order = np.empty_like(values), len(memory)
+    memory = np.append(memory, 0.0)
+    for row in range(len(values)):
+        behind[row] = memory[0] + numerator[0] * values[row]
+        for each in range(order):
+            memory[each] = memory[each + 1] + numerator[each + 1] * values[row] - denominator[each + 1] * behind[row]
+    return behind
 
 
 @kernel
