@@ -11,7 +11,7 @@ from app.autopilots.log_readers import read_content
 
 NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")
 DATABASE = ("pydantic", "sqlalchemy")
-READS_LOGS = re.compile(r"app\.autopilots\.(readers|tlog|\w+\.(log|flight|replica_check))")
+READS_LOGS = re.compile(r"app\.autopilots\.(log_readers|tlog|\w+\.(log|logged_flight|replica_check))")
 
 SERVE = """
 import sys
@@ -66,6 +66,13 @@ def test_the_first_pages_are_served_without_a_numeric_library(migrated_file: Pat
 @pytest.mark.complete
 def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
     assert not imported(HELP).intersection((*NUMERICS, *DATABASE, "fastapi", "numpy", "structlog"))
+
+
+@pytest.mark.complete
+def test_a_log_is_analysed_without_the_database() -> None:
+    modules = imported("import app.cli.log_analysis")
+    assert "numpy" in modules
+    assert not modules.intersection((*NUMERICS, "sqlalchemy"))
 
 
 def test_processes_that_compute_and_fly_do_not_import_the_database() -> None:
