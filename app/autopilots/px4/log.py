@@ -77,6 +77,9 @@ AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
 }  # fmt: skip
 """Kinds of vehicles that are no copter with several rotors, by the values of parameters."""
 
+_RELEASE: Final = "ver_sw_release"
+_STAGES: Final[Mapping[int, str]] = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+_LARGEST_MAJOR: Final = 9
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
@@ -90,12 +93,14 @@ _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position",
 def read_px4(stream: BinaryIO) -> Recording:
     """Decode a whole log. Raises TrajectoryError if it is not a readable ULog."""
     wanted = {_COMMAND, _ANSWER, *(source.message for source in SOURCES.values())}
-    tables = read_ulog_tables(stream, topics=wanted, parameters={*LOOP_NAMES, VEHICLE, *AIRFRAMES})
+    values = {*LOOP_NAMES, VEHICLE, *AIRFRAMES, _RELEASE}
+    tables = read_ulog_tables(stream, topics=wanted, values=values)
     columns = columns_of(tables.topics, SOURCES, clock="timestamp")
     arming = columns.get("arming_state")
     recording = Recording(
         title="PX4's log (ULog)",
         autopilot=PX4,
+        release=_release(tables.information.get(_RELEASE, 0)),
         columns=columns,
         sources=[topic for topic, table in tables.topics.items() if len(table.get("timestamp", ()))],
         settings=[Setting(*each) for each in tables.settings],
@@ -108,6 +113,12 @@ def read_px4(stream: BinaryIO) -> Recording:
         armed=None if arming is None else _spans(arming.time_s, arming.values == _ARMED),
         remarks=list(_remarks(columns)),
     )
+
+
+def _release(packed: int) -> str:
+    """The version in four bytes: "1.15.1", "1.13.0-dev"; empty if they are none."""
+    major, minor, patch, stage = packed.to_bytes(4, "big")
+    return f"{major}.{minor}.{patch}{_STAGES[stage]}" if 0 < major <= _LARGEST_MAJOR and stage in _STAGES else ""
 
 
 def _spans(time_s: Samples, holds: Rows) -> list[Span]:
