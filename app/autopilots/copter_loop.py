@@ -32,15 +32,19 @@ class CopterLoop:
     def assumed_hover_throttle(self) -> float:
         return self.parameters.named[self.texts.hover_parameter]
 
+    @property
+    def defaults(self) -> Mapping[str, float]:
+        """The firmware's, by the names of the loop's own parameters."""
+        return type(self.parameters)().named
+
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:
         return dict(gains)
 
     def rules(self, hover_throttle: float) -> dict[str, dict[str, float]]:
         """The firmware's defaults, the rules of its documentation, fixed sets."""
-        named = type(self.parameters)().named
         fixed = [dict(zip(self.space.bounds, values, strict=True)) for values in self.compared]
         return {
-            f"{self.texts.autopilot}'s default gains": {name: named[name] for name in self.space.bounds},
+            f"{self.texts.autopilot}'s default gains": {name: self.defaults[name] for name in self.space.bounds},
             **self.documented(hover_throttle),
             **{f"For comparison: {in_order(self.named(gains))}": gains for gains in fixed},
         }

@@ -10,7 +10,8 @@ from app.autopilots.ardupilot.experiments import ardupilot_loop
 from app.autopilots.ardupilot.logged_flight import HOLDS_ALTITUDE, has_newer_names
 from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.px4.experiments import px4_loop
-from app.autopilots.px4.logged_flight import LEFT_OUT_MODES
+from app.autopilots.px4.logged_flight import LEFT_OUT_MODES, has_thrust_gains
+from app.autopilots.px4.replica.parameters import in_accelerations
 from app.autopilots.recording import EventKind, Recording, Rows
 from app.autopilots.segments import find_landings, within_limits
 from app.core.analysis.description import LONGEST_GAP_S, FlightSignals
@@ -54,8 +55,9 @@ def signals_of(recording: Recording) -> FlightSignals | None:
     )
 
 
-def loop_of(recording: Recording, at_s: float) -> AltitudeLoop | None:
-    """The loop with the parameters at a time; None if the recording lacks its gains, or a replica does not have it."""
+def loop_of(recording: Recording, at_s: float, hover_throttle: float) -> AltitudeLoop | None:
+    """The loop with the parameters at a time, of a vehicle that hovers with this throttle; None if the recording lacks
+    its gains, or a replica does not have it."""
     given: dict[str, float] = {}
     for each in sorted(recording.settings, key=lambda setting: setting.time_s):
         name, value = in_older_names(each.name, each.value)
@@ -63,16 +65,19 @@ def loop_of(recording: Recording, at_s: float) -> AltitudeLoop | None:
             given[name] = value
         else:
             given.setdefault(name, value)
+    thrust_gains_at = None
+    if "thrust_target" in recording.columns and has_thrust_gains(recording):
+        thrust_gains_at, given = hover_throttle, in_accelerations(given, hover_throttle)
     try:
-        loop = _LOOPS[recording.autopilot.name](recording, given)
+        loop = _LOOPS[recording.autopilot.name](recording, given, thrust_gains_at)
     except (KeyError, InputError):
         return None
     return loop if all(given.get(name, -1.0) >= 0.0 for name in loop.space.bounds) else None
 
 
-_LOOPS: Final[Mapping[str, Callable[[Recording, Mapping[str, float]], AltitudeLoop]]] = {
-    "ardupilot": lambda recording, given: replace(ardupilot_loop(given), has_newer_names=has_newer_names(recording)),
-    "px4": lambda _, given: px4_loop(given),
+_LOOPS: Final[Mapping[str, Callable[[Recording, Mapping[str, float], float | None], AltitudeLoop]]] = {
+    "ardupilot": lambda recording, given, _: replace(ardupilot_loop(given), has_newer_names=has_newer_names(recording)),
+    "px4": lambda _, given, thrust_gains_at: replace(px4_loop(given), thrust_gains_at=thrust_gains_at),
 }
 
 

@@ -138,9 +138,9 @@ def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[T
 
 def _margins(recording: Recording, description: Description | None) -> UsualMargins | None:
     """Margins with the hover throttle of a flight, if its gains are known."""
-    if description is None or description.hover_throttle is None:
+    if description is None or not description.hover_throttle:
         return None
-    loop = loop_of(recording, recording.columns["altitude_m"].time_s[-1])
+    loop = loop_of(recording, recording.columns["altitude_m"].time_s[-1], description.hover_throttle)
     return None if loop is None else usual_margins(loop, description.hover_throttle)
 
 
@@ -149,6 +149,7 @@ _DOUBTFUL: Final = frozenset(
     each.key
     for each in (
         ReasonCode.CONSTANT_SIGNAL,
+        ReasonCode.DERIVATIVE_REVERSED,
         ReasonCode.DEVIATION_NOT_EXPLAINED,
         ReasonCode.OTHER_CONTROLLER,
         ReasonCode.PARAMETER_READ_LATE,

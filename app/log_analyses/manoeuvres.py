@@ -45,7 +45,7 @@ def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> tup
         grade=analysis.grade,
         reasons=[] if why is None else [ReasonField.view_of(why.problem)],
         proposes=analysis.proposed is not None,
-        starts_campaign=analysis.proposed is not None,
+        starts_campaign=bool(_starting_gains(analysis)),
         experiment=_STEPS[analysis.loop.texts.autopilot].name,
         numbers=_numbers(analysis, assumed),
     )
@@ -194,18 +194,25 @@ def _rounded(values: Samples) -> tuple[float, ...]:
     return tuple(round(value, 5) for value in values.tolist())
 
 
+def _starting_gains(analysis: Analysis) -> dict[str, float]:
+    """The proposed gains by the names of the loop; none if campaigns do not fly those of the vehicle's release."""
+    experiment = _STEPS[analysis.loop.texts.autopilot]
+    gains = {} if analysis.proposed is None else experiment.loop_parameters(analysis.proposed.gains)
+    return gains if gains.keys() >= analysis.loop.gains.keys() else {}
+
+
 def start_of(analysis: Analysis, file_name: str) -> Definition:
     """The definition of a campaign that starts with the proposed gains. Raises TrajectoryError if the analysis proposes
-    none."""
-    if analysis.proposed is None:
+    none that a campaign flies."""
+    proposed = _starting_gains(analysis)
+    if not proposed:
         raise TrajectoryError(
             f"No campaign starts from {file_name}.",
             hint=analysis.answer,
-            problems=(Problem("file", "gives no better gains to begin with"),),
+            problems=(Problem("file", "gives no better gains for a campaign to begin with"),),
         )
     experiment = _STEPS[analysis.loop.texts.autopilot]
     parameters = analysis.loop.firmware_parameters
-    proposed = experiment.loop_parameters(analysis.proposed.gains)
     space = experiment.space
     mean, deviation = (vector_of(each).tolist() for each in (analysis.estimate.mean, analysis.estimate.deviation))
     gains = space.mapping(space.nearest(space.vector({name: parameters[name] for name in space.names} | proposed)))

@@ -1,4 +1,4 @@
-"""Tables of PX4's logs (.ulg, "ULog"): the wanted topics and parameters.
+"""Tables of PX4's logs (.ulg, "ULog"): the wanted topics, parameters and numbers about the log.
 
 The file is filtered first: only messages that are wanted, with flat and valid formats, are passed to pyulog. This
 bounds memory and time by the flight, whatever a file claims to contain.
@@ -8,7 +8,9 @@ import io
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import BinaryIO, Final
+from itertools import groupby
+from operator import attrgetter
+from typing import Any, BinaryIO, Final
 
 import numpy as np
 
@@ -24,18 +26,21 @@ _LARGEST_ARRAY: Final = 64
 _MAX_FIELDS: Final = 300
 _FIELD: Final = re.compile(r"(u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,3})\])? (\w+)")
 _APPENDED: Final = 0x01
-_PARAMETERS: Final = frozenset({"float", "int32_t"})
+_VALUES: Final[Mapping[str, Collection[str]]] = {"P": ("float", "int32_t"), "I": ("uint32_t",)}
+"""Types of parameters, and of the numbers about the log."""
 
 HINT: Final = "Use PX4's .ulg log of the flight, with vehicle_local_position in it."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ULogTables:
-    """The first instance of each wanted topic, time, s, name and value of the wanted parameters in order of their time,
-    of which those from before the log are at −∞, and remarks on what the log lacks."""
+    """The lowest instance of each wanted topic; time, s, name and value of the wanted parameters in order of their
+    time, of which those from before the log are at −∞; the wanted numbers about the log, and remarks on what it lacks.
+    """
 
     topics: Mapping[str, Table]
     settings: Sequence[tuple[float, str, float]]
+    information: Mapping[str, int]
     notes: Sequence[str]
 
 
@@ -44,32 +49,50 @@ def is_ulog(head: bytes) -> bool:
     return head.startswith(_MAGIC)
 
 
-def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], parameters: Collection[str]) -> ULogTables:
-    """Read these topics and parameters of a whole log. Raises TrajectoryError if it is not a readable ULog."""
+def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], values: Collection[str]) -> ULogTables:
+    """Read these topics, parameters and numbers about the log of a whole log. Raises TrajectoryError if it is not a
+    readable ULog."""
     from pyulog import ULog
     from pyulog.exceptions import ULogException
 
     data = contents(stream)
     if not is_ulog(data[:_HEADER_BYTES]) or len(data) < _HEADER_BYTES:
         raise refused("is not a ULog file", HINT)
-    sieve = _LogFilter(topics, parameters)
+    sieve = _LogFilter(topics, values)
     sieve.filter(data)
     try:
         log = ULog(io.BytesIO(sieve.kept))
     except (ULogException, ValueError, KeyError, IndexError, TypeError) as error:
         raise refused(f"is damaged: {error}", HINT) from error
     changes = ((time_us / 1e6, name, value) for time_us, name, value in log.changed_parameters)
-    values = [*((-np.inf, name, value) for name, value in log.initial_parameters.items()), *changes]
+    settings = [*((-np.inf, name, value) for name, value in log.initial_parameters.items()), *changes]
     notes = [f"{count(sieve.damages, 'damaged section')} skipped"] if sieve.damages else []
     notes += ["the file ends in the middle of a message"] if sieve.is_cut_off else []
     if log.dropouts:
         lost_s = sum(each.duration for each in log.dropouts) / 1000
         notes.append(f"the logger dropped data {times(len(log.dropouts))}, {lost_s:.2f} s in total")
     return ULogTables(
-        topics={each.name: each.data for each in log.data_list},
-        settings=tuple((at_s, name, float(value)) for at_s, name, value in values if np.isfinite(value)),
+        topics=_lowest_instances(log.data_list),
+        settings=tuple((at_s, name, float(value)) for at_s, name, value in settings if np.isfinite(value)),
+        information=log.msg_info_dict,
         notes=notes,
     )
+
+
+def _lowest_instances(subscribed: Sequence[Any]) -> dict[str, Table]:
+    """The rows of the lowest instance of each topic, of all with rows, which are in order of names and instances."""
+    tables: dict[str, Table] = {}
+    for (name, _), same in groupby(subscribed, key=attrgetter("name", "multi_id")):
+        tables.setdefault(name, _joined([each.data for each in same]))
+    return tables
+
+
+def _joined(tables: Sequence[Table]) -> Table:
+    """The rows of one topic in order of time, if it was subscribed several times."""
+    if len(tables) == 1:
+        return tables[0]
+    order = np.argsort(np.concatenate([each["timestamp"] for each in tables]), kind="stable")
+    return {name: np.concatenate([each[name] for each in tables])[order] for name in tables[0]}
 
 
 @dataclass(slots=True)
@@ -78,7 +101,7 @@ class _LogFilter:
     message is not complete."""
 
     topics: Collection[str]
-    parameters: Collection[str]
+    values: Collection[str]
     kept: bytearray = field(default_factory=bytearray)
     damages: int = 0
     is_cut_off: bool = False
@@ -117,8 +140,8 @@ class _LogFilter:
                 return self._takes_format(data[start:end])
             case "A":
                 return self._subscribes(data[start:end])
-            case "P":
-                return self._is_parameter(data[start:end])
+            case "P" | "I" as letter:
+                return self._is_value(data[start:end], _VALUES[letter])
             case "B":
                 self._flags(data[start:end])
         return False
@@ -143,11 +166,11 @@ class _LogFilter:
         return sound
 
     def _subscribes(self, body: bytes) -> bool:
-        """Whether this subscribes to the first instance of a wanted topic."""
+        """Whether this subscribes to an instance of a wanted topic."""
         if len(body) < 4:
             return False
-        instance, number, name = body[0], body[1] | body[2] << 8, body[3:].decode("ascii", "replace")
-        if instance or name not in self._formats or number in self._subscribed:
+        number, name = body[1] | body[2] << 8, body[3:].decode("ascii", "replace")
+        if name not in self._formats or number in self._subscribed:
             return False
         self._subscribed.add(number)
         return True
@@ -160,8 +183,7 @@ class _LogFilter:
         offsets = [int.from_bytes(body[at : at + 8], "little") for at in (16, 24, 32)]
         self._appended = sorted(offset for offset in offsets if offset)
 
-    def _is_parameter(self, body: bytes) -> bool:
-        """Whether this is one of the parameters, in PX4's form: "float NAME" or "int32_t NAME", and its value."""
-        key = body[1 : 1 + body[0]].decode("ascii", "replace")
-        kind, _, name = key.partition(" ")
-        return kind in _PARAMETERS and name in self.parameters and len(body) == 1 + body[0] + 4
+    def _is_value(self, body: bytes, kinds: Collection[str]) -> bool:
+        """Whether this is a wanted name in PX4's form, "float NAME" of one of these kinds, and its value."""
+        kind, _, name = body[1 : 1 + body[0]].decode("ascii", "replace").partition(" ")
+        return kind in kinds and name in self.values and len(body) == 1 + body[0] + 4

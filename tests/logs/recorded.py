@@ -63,14 +63,14 @@ class ULogFile:
 
     def __init__(self) -> None:
         self._topics: dict[str, tuple[int, str]] = {}
-        self._formats = self._subscriptions = self._parameters = b""
+        self._formats = self._subscriptions = self._parameters = self._information = b""
         self._rows: list[tuple[int, bytes]] = []
 
     @property
     def content(self) -> bytes:
         """The whole file."""
         rows = (body for _, body in sorted(self._rows, key=lambda row: row[0]))
-        return b"".join((ULOG_HEADER, self._formats, self._parameters, self._subscriptions, *rows))
+        return b"".join((ULOG_HEADER, self._information, self._formats, self._parameters, self._subscriptions, *rows))
 
     def define(self, topic: str, fields: str, layout: str) -> None:
         """A topic with these fields ("float z;float vz;") beside its time, packed by `layout`."""
@@ -78,6 +78,10 @@ class ULogFile:
         self._topics[topic] = (number, layout)
         self._formats += ulog_message("F", f"{topic}:uint64_t timestamp;{fields}".encode())
         self._subscriptions += ulog_message("A", b"\0" + struct.pack("<H", number) + topic.encode())
+
+    def information(self, key: str, value: bytes) -> None:
+        """A fact about the log, of this type and name ("uint32_t ver_sw_release")."""
+        self._information += ulog_message("I", bytes([len(key)]) + key.encode() + value)
 
     def parameter(self, name: str, value: float, *, at_s: float | None = None) -> None:
         """A parameter from before the log, or changed at a time; whole numbers are integers."""

@@ -89,9 +89,9 @@ def test_a_recording_without_an_altitude_has_no_signals() -> None:
 def test_the_loop_has_the_gains_of_the_time_by_the_names_of_the_release() -> None:
     changes = ((15.0, "PSC_ACCZ_P", 0.8),)
     recording = copter(ardupilot_log(simulated_flight(QUIET), changes=changes))
-    gains = [loop.gains["PSC_ACCZ_P"] for at_s in (15.0, 25.0) if (loop := loop_of(recording, at_s)) is not None]
+    gains = [loop.gains["PSC_ACCZ_P"] for at_s in (15.0, 25.0) if (loop := loop_of(recording, at_s, 0.4)) is not None]
     assert gains == pytest.approx([0.5, 0.8])
-    newer = loop_of(copter(ardupilot_log(simulated_flight(QUIET), parameters=NEWER_PARAMETERS)), 20.0)
+    newer = loop_of(copter(ardupilot_log(simulated_flight(QUIET), parameters=NEWER_PARAMETERS)), 20.0, 0.4)
     assert newer is not None
     assert usual_margins(newer, 0.4).sets[0].gains["PSC_D_ACC_P"] == pytest.approx(0.05)
 
@@ -100,4 +100,4 @@ def test_there_is_no_loop_without_its_gains_or_with_what_a_replica_lacks() -> No
     flight = simulated_flight(QUIET)
     without = {name: value for name, value in PARAMETERS.items() if name != "PSC_ACCZ_I"}
     for parameters in (without, {**PARAMETERS, "PSC_ACCZ_SMAX": 5.0}):
-        assert loop_of(copter(ardupilot_log(flight, parameters=parameters)), 20.0) is None
+        assert loop_of(copter(ardupilot_log(flight, parameters=parameters)), 20.0, 0.4) is None

@@ -99,7 +99,7 @@ def test_of_the_recorded_takeoff_nothing_is_left() -> None:
     [
         ({"without": ["vehicle_local_position"]}, "vehicle_local_position", "message_missing"),
         ({"without": ["trajectory_setpoint"]}, "trajectory_setpoint", "message_missing"),
-        ({"without": ["takeoff_status"]}, "takeoff_status", "message_missing"),
+        ({"without": ["takeoff_status", "vehicle_land_detected"]}, "takeoff_status", "message_missing"),
         ({"without": ["vehicle_status"]}, "vehicle_status", "message_missing"),
         (
             {"renamed": ("float[3] thrust;", "float[3] xhrust;")},
@@ -107,6 +107,7 @@ def test_of_the_recorded_takeoff_nothing_is_left() -> None:
             "column_missing",
         ),
         ({"takeoff": ((0.0, READY), (1.0, RAMP_UP))}, "takeoff_status", "never_flew"),
+        ({"without": ["takeoff_status"], "landed": ((0.0, True),)}, "takeoff_status", "never_flew"),
         ({"landed": ((0.0, True),)}, "takeoff_status", "never_flew"),
         ({"modes": ((0.0, TAKEOFF), (8.0, LAND))}, "vehicle_status", "only_takeoffs_or_landings"),
         (
@@ -220,6 +221,11 @@ def test_a_thrust_hardly_below_zero_is_none() -> None:
 def test_the_ramp_of_a_takeoff_and_the_ground_are_left_out() -> None:
     log = px4_log(flown(), takeoff=((0.0, RAMP_UP), (2.0, IN_FLIGHT)), landed=((0.0, False), (40.0, True)))
     assert spans_s(read(log)) == [(2.0, 23.9)]
+
+
+def test_without_its_state_a_takeoff_lasts_as_long_as_the_ramp_after_the_lift_off() -> None:
+    log = px4_log(flown(), without=["takeoff_status"], landed=((0.0, True), (1.0, False)))
+    assert spans_s(read(log)) == [(4.0, 23.9)]
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:

@@ -82,7 +82,7 @@ def test_without_a_message_what_depends_on_it_is_not_computed(topic: bytes, sign
         ((b"vehicle_local_position:", b"vehicle_local_posixion:"), "vehicle_local_position: is missing"),
         ((b"takeoff_status", b"xakeoff_status"), "takeoff_status: is missing"),
         ((b"float MPC_Z_VEL_D_ACC", b"float XPC_Z_VEL_D_ACC"), "MPC_Z_VEL_D_ACC: is missing"),
-        ((b"float[3] thrust;", b"float[3] xhrust;"), "vehicle_local_position_setpoint: is missing"),
+        ((b"float[3] thrust;", b"float[3] xhrust;"), "vehicle_local_position_setpoint.thrust[2]: is missing"),
     ],
 )
 def test_a_log_that_cannot_be_compared_is_refused_by_what_is_missing(

@@ -188,6 +188,82 @@ def test_formats_that_are_bombs_or_nonsense_cost_nothing_and_are_refused(describ
         read_takeoffs(io.BytesIO(content))
 
 
+def instances(*rows: tuple[int, float, float], subscribed: tuple[tuple[int, int], ...]) -> bytes:
+    """A log of altitudes: rows of message number, time, s, and altitude, m; the numbers are those of instances in the
+    order in which they are subscribed, each before the first row with its number."""
+    content = HEADER + message("F", b"vehicle_local_position:uint64_t timestamp;float z;")
+    waiting = dict(subscribed)
+    for number, time_s, altitude_m in rows:
+        for each in [each for each in waiting if each <= number]:
+            subscription = bytes([waiting.pop(each)]) + struct.pack("<H", each) + b"vehicle_local_position"
+            content += message("A", subscription)
+        content += message("D", struct.pack("<HQf", number, round(time_s * 1e6), -altitude_m))
+    return content
+
+
+def altitudes(content: bytes) -> tuple[list[float], list[float]]:
+    column = read_px4(io.BytesIO(content)).columns["altitude_m"]
+    return column.time_s.tolist(), column.values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("subscribed", "rows", "expected"),
+    [
+        pytest.param(((7, 1),), [(7, 1.0, 5.0), (7, 2.0, 6.0)], ([1.0, 2.0], [5.0, 6.0]), id="no first instance"),
+        pytest.param(
+            ((7, 0), (8, 1)), [(8, 0.5, 9.0), (7, 1.0, 5.0), (8, 1.5, 9.0), (7, 2.0, 6.0)], ([1.0, 2.0], [5.0, 6.0]),
+            id="two instances in turn",
+        ),
+        pytest.param(
+            ((7, 2), (8, 1), (9, 0)), [(7, 0.5, 9.0), (8, 0.6, 9.0), (9, 1.0, 5.0), (7, 1.5, 9.0), (9, 2.0, 6.0)],
+            ([1.0, 2.0], [5.0, 6.0]), id="the first instance is the last",
+        ),
+        pytest.param(
+            ((7, 3), (8, 2)), [(7, 0.5, 9.0), (8, 1.0, 5.0), (8, 2.0, 6.0)], ([1.0, 2.0], [5.0, 6.0]),
+            id="the lowest that there is",
+        ),
+        pytest.param(
+            ((7, 0), (8, 1), (9, 0)), [(7, 1.0, 5.0), (8, 1.5, 9.0), (9, 2.0, 6.0), (9, 3.0, 7.0)],
+            ([1.0, 2.0, 3.0], [5.0, 6.0, 7.0]), id="subscribed twice",
+        ),
+        pytest.param(
+            ((7, 0), (8, 0)), [(7, 1.0, 5.0), (8, 2.0, 6.0), (7, 3.0, 7.0)], ([1.0, 2.0, 3.0], [5.0, 6.0, 7.0]),
+            id="subscribed twice, in turn",
+        ),
+        pytest.param(
+            ((7, 1), (8, 0)), [(7, 1.0, 5.0), (7, 2.0, 6.0)], ([1.0, 2.0], [5.0, 6.0]), id="the first has no row",
+        ),
+    ],
+)  # fmt: skip
+def test_one_instance_of_a_topic_is_read_whole(
+    subscribed: tuple[tuple[int, int], ...], rows: list[tuple[int, float, float]], expected: tuple[list[float], ...]
+) -> None:
+    assert altitudes(instances(*rows, subscribed=subscribed)) == expected
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"\x17uint32_t ver_sw_release" + b"\xff",
+        b"\x17uint32_t ver_sw_release",
+        b"\xffuint32_t ver_sw_release\xff\x01\x0f\x01",
+        b"\x16int32_t ver_sw_release\xff\xff\xff\xff",
+        b"\x14float ver_sw_release\x00\x00\xc0\x7f",
+        b"\x17char[4] ver_sw_release1.15",
+        b"\x00",
+        b"\x03\xff\xfe\xfd",
+    ],
+)
+def test_a_release_that_is_damaged_is_not_known(body: bytes) -> None:
+    content = instances((7, 1.0, 5.0), subscribed=((7, 0),)) + message("I", body)
+    assert read_px4(io.BytesIO(content)).release == ""
+
+
+def test_the_release_may_be_told_anywhere_in_the_log() -> None:
+    told = message("I", b"\x17uint32_t ver_sw_release" + struct.pack("<I", 0x010F0180))
+    assert read_px4(io.BytesIO(instances((7, 1.0, 5.0), subscribed=((7, 0),)) + told)).release == "1.15.1-beta"
+
+
 def test_a_log_written_in_a_way_that_is_not_known_is_refused() -> None:
     with pytest.raises(TrajectoryError, match="newer PX4"):
         read_takeoffs(io.BytesIO(HEADER + message("B", bytes(8) + b"\x02" + bytes(31))))

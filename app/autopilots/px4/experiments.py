@@ -23,8 +23,11 @@ from app.autopilots.px4.replica.hover_range import (
 from app.autopilots.px4.replica.parameters import (
     DEFAULTS,
     LOOP_NAMES,
+    THRUST_DEFAULTS,
     Parameters,
     estimator_step_s,
+    in_accelerations,
+    in_thrusts,
     low_pass_gain,
     parameters_from,
     step_parameters,
@@ -85,7 +88,9 @@ class Px4Loop(CopterLoop):
     """The loop (`AltitudeLoop`), with the limits of its mode.
 
     The acceleration in the log is the change of the climb rate over `row_s`, a whole number of steps. The estimated
-    hover throttle is within `hover_deviation` of the parameter. `vehicle` is the number of the vehicle in MAVLink.
+    hover throttle is within `hover_deviation` of the parameter. `vehicle` is the number of the vehicle in MAVLink. The
+    gains are those until release 1.10 of a vehicle that hovers with `thrust_gains_at`, if that is given: the firmware
+    then estimates no hover throttle.
     """
 
     parameters: Parameters
@@ -93,13 +98,14 @@ class Px4Loop(CopterLoop):
     descent_m_s: float
     hover_deviation: float = HOVER_RANGE
     vehicle: int = 1
+    thrust_gains_at: float | None = None
 
     texts = LoopTexts(
         autopilot="PX4",
         prefix="MPC_",
         hover_parameter="MPC_THR_HOVER",
         hover_range=HOVER_THRUSTS,
-        hover_use="PX4 estimates the hover throttle in flight, but takes off with the parameter",
+        hover_use="PX4 takes off with the parameter, whatever it finds in flight",
         fast_gains="P, I and D of the velocity controller",
         lateness="dead time",
         what_to_fly=(
@@ -129,8 +135,15 @@ class Px4Loop(CopterLoop):
         return self.parameters.named | {HOVER_RANGE_NAME: self.hover_deviation} | step_parameters(self.step_s)
 
     @property
-    def hover_limits(self) -> tuple[float, float]:
-        return hover_limits(self.parameters.hover_thrust, self.hover_deviation)
+    def defaults(self) -> Mapping[str, float]:
+        return in_accelerations(THRUST_DEFAULTS, self.thrust_gains_at) if self.thrust_gains_at else DEFAULTS
+
+    def named(self, gains: Mapping[str, float]) -> dict[str, float]:
+        return in_thrusts(gains, self.thrust_gains_at) if self.thrust_gains_at else dict(gains)
+
+    @property
+    def hover_limits(self) -> tuple[float, float] | None:
+        return None if self.thrust_gains_at else hover_limits(self.parameters.hover_thrust, self.hover_deviation)
 
     @property
     def throttle_limits(self) -> tuple[float, float]:
@@ -209,7 +222,7 @@ class Px4Loop(CopterLoop):
         whole steps: with more lag alone, a loop without a filter of its throttle hardly ever rings."""
         packed, p = self.packed(copter), vertical.packed(self.parameters, self.step_s)
         hover = float(packed[HOVER_THROTTLE])
-        estimate = found_hover(self, hover)
+        estimate = self.thrust_gains_at or found_hover(self, hover)
         reference, still = np.array([[0.0, 0.0, 0.0, estimate]]), np.zeros((1, len(DISTURBANCES)))
         inputs, outputs = self._inputs(), np.empty((1, len(vertical.OUTPUTS)), dtype=np.float32)
 

@@ -7,7 +7,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.autopilots.px4.profile import PX4
-from app.autopilots.px4.replica.parameters import LOOP_NAMES
+from app.autopilots.px4.replica.parameters import LOOP_NAMES, THRUST_GAINS
 from app.autopilots.recording import (
     COMMANDS,
     Column,
@@ -26,7 +26,7 @@ from app.logs.base import Table, rows_of
 from app.logs.ulog import read_ulog_tables
 
 POSITION, TARGET, SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
-TAKEOFF, STATUS = "takeoff_status", "vehicle_status"
+TAKEOFF, STATUS, _ATTITUDE = "takeoff_status", "vehicle_status", "vehicle_attitude_setpoint"
 _LANDED, _LIMITS, _HOVER = "vehicle_land_detected", "vehicle_constraints", "hover_thrust_estimate"
 _COMMAND, _ANSWER = "vehicle_command", "vehicle_command_ack"
 
@@ -66,6 +66,16 @@ SOURCES: Final[Mapping[str, Source]] = {
 }
 """The given values are the set-points, in force until the next one; `thrust` is that of the body, logged more often
 than its target."""
+_OLDER_SOURCES: Final[Mapping[str, Source]] = {
+    "given_altitude_m": Source(SET_POINT, "z", -1.0),
+    "given_climb_rate_m_s": Source(SET_POINT, "vz", -1.0),
+    "thrust": Source("actuator_controls_0", "control[3]"),
+    "demanded_throttle": Source(_ATTITUDE, "thrust"),
+    "roll_deg": Source(_ATTITUDE, "roll_body", np.degrees(1.0)),
+    "pitch_deg": Source(_ATTITUDE, "pitch_body", np.degrees(1.0)),
+    "is_rotary_wing": _state(STATUS, "is_rotary_wing"),
+}
+"""The same, or what there was instead, in releases until 1.13."""
 VEHICLE: Final = "MAV_SYS_ID"
 AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
     "CA_AIRFRAME": {"plane": range(1, 2), "VTOL": range(2, 5), "rover": range(5, 7), "helicopter": range(10, 13)},
@@ -77,11 +87,14 @@ AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
 }  # fmt: skip
 """Kinds of vehicles that are no copter with several rotors, by the values of parameters."""
 
+_RELEASE: Final = "ver_sw_release"
+_STAGES: Final[Mapping[int, str]] = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+_LARGEST_MAJOR: Final = 9
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
 """Return, descend, land, precision landing: no takeoff begins in these modes."""
-_ARMED: Final = 2.0
+ARMED: Final = 2.0
 _BOUNCE_S: Final = 2.0
 """Leaving the ground sooner than this after a touchdown is not a new takeoff."""
 _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position", 3: "mission", 5: "return", 18: "land"}
@@ -89,13 +102,16 @@ _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position",
 
 def read_px4(stream: BinaryIO) -> Recording:
     """Decode a whole log. Raises TrajectoryError if it is not a readable ULog."""
-    wanted = {_COMMAND, _ANSWER, *(source.message for source in SOURCES.values())}
-    tables = read_ulog_tables(stream, topics=wanted, parameters={*LOOP_NAMES, VEHICLE, *AIRFRAMES})
-    columns = columns_of(tables.topics, SOURCES, clock="timestamp")
+    wanted = {_COMMAND, _ANSWER, *(source.message for source in (*SOURCES.values(), *_OLDER_SOURCES.values()))}
+    values = {*LOOP_NAMES, *THRUST_GAINS.values(), VEHICLE, *AIRFRAMES, _RELEASE}
+    tables = read_ulog_tables(stream, topics=wanted, values=values)
+    columns = columns_of(tables.topics, _OLDER_SOURCES, clock="timestamp")
+    columns |= columns_of(tables.topics, SOURCES, clock="timestamp")
     arming = columns.get("arming_state")
     recording = Recording(
         title="PX4's log (ULog)",
         autopilot=PX4,
+        release=_release(tables.information.get(_RELEASE, 0)),
         columns=columns,
         sources=[topic for topic, table in tables.topics.items() if len(table.get("timestamp", ()))],
         settings=[Setting(*each) for each in tables.settings],
@@ -105,9 +121,15 @@ def read_px4(stream: BinaryIO) -> Recording:
         recording,
         events=[*_commands(tables.topics), *_changes(recording)],
         in_air=_in_air(recording),
-        armed=None if arming is None else _spans(arming.time_s, arming.values == _ARMED),
+        armed=None if arming is None else _spans(arming.time_s, arming.values == ARMED),
         remarks=list(_remarks(columns)),
     )
+
+
+def _release(packed: int) -> str:
+    """The version in four bytes: "1.15.1", "1.13.0-dev"; empty if they are none."""
+    major, minor, patch, stage = packed.to_bytes(4, "big")
+    return f"{major}.{minor}.{patch}{_STAGES[stage]}" if 0 < major <= _LARGEST_MAJOR and stage in _STAGES else ""
 
 
 def _spans(time_s: Samples, holds: Rows) -> list[Span]:
@@ -144,7 +166,7 @@ def _changes(recording: Recording) -> Iterator[Event]:
 def _may_be_armed(recording: Recording, time_s: Samples) -> Rows:
     """Whether the motors were armed at these times, or it was not reported, shape (n,)."""
     state = recording.at("arming_state", time_s)
-    return np.asarray((state == _ARMED) | np.isnan(state))
+    return np.asarray((state == ARMED) | np.isnan(state))
 
 
 def _in_air(recording: Recording) -> list[Span] | None:

@@ -14,9 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.px4.experiments import Px4Loop
-from app.autopilots.px4.log import AIRFRAMES, SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
-from app.autopilots.px4.replica.hover_range import hover_deviation
-from app.autopilots.px4.replica.parameters import LOOP_NAMES, estimator_step_s, parameters_from
+from app.autopilots.px4.log import AIRFRAMES, ARMED, SET_POINT, SOURCES, STATUS, TAKEOFF, TARGET, VEHICLE
+from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME, hover_deviation
+from app.autopilots.px4.replica.parameters import (
+    LOOP_NAMES,
+    THRUST_GAINS,
+    estimator_step_s,
+    in_accelerations,
+    parameters_from,
+)
 from app.autopilots.px4.replica.vertical import FLIGHT, GRAVITY
 from app.autopilots.recording import EventKind, Recording, Rows
 from app.autopilots.segments import (
@@ -34,12 +40,20 @@ from app.core.analysis.segment import FinerSegment, Segment
 from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples
 
-_NEEDED: Final = (
-    "altitude_m", "climb_rate_m_s", "reference_m", "climb_rate_target_m_s", "acceleration_target_m_s2", "thrust_target",
-    "given_climb_rate_m_s", "given_acceleration_m_s2", "takeoff_state", "mode",
-)  # fmt: skip
-_ROTORS: Final = 1.0
-_KINDS: Final[Mapping[float, str]] = MappingProxyType({2: "plane", 3: "rover"})
+_NEEDED: Final = ("altitude_m", "climb_rate_m_s", "reference_m", "climb_rate_target_m_s", "thrust_target", "mode")
+_OF_ACCELERATIONS: Final = ("acceleration_target_m_s2", "given_climb_rate_m_s", "given_acceleration_m_s2")
+"""Needed since release 1.11, whose gains are of accelerations."""
+_REVERSED: Final = "1.11.0"
+"""The release with the wrong sign of the derivative of the climb rate."""
+_DERIVATIVE: Final = "MPC_Z_VEL_D_ACC"
+_ANY_HOVER: Final = 1.0
+"""Releases without the parameter did not limit the estimated hover thrust to a range about another one."""
+_RAMP_S: Final = 3.0
+"""By default, the thrust rises so long in a takeoff."""
+_UNEXPLAINED_SHARE: Final = 0.05
+"""Of the climb rate targets: with more, the set-points do not tell what was fed forward."""
+_ROTORS, _WINGS = 1.0, 2.0
+_KINDS: Final[Mapping[float, str]] = MappingProxyType({_WINGS: "plane", 3: "rover"})
 """Kinds of vehicle in its status, but for those with rotors, 1."""
 LEFT_OUT_MODES: Final = (12.0, 17.0, 18.0, 20.0)
 """Modes: descend, takeoff, land, precision landing."""
@@ -58,15 +72,12 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the topic or parameter that is missing, or InputError for one not supported.
     """
-    refused = _refused(recording, name)
+    refused, older = _refused(recording, name), THRUST_GAINS if has_thrust_gains(recording) else {}
     _require_columns(recording, refused)
-    rows, acceleration_target, lean = (
-        _rows(recording),
-        recording.columns["acceleration_target_m_s2"].values,
-        _lean(recording),
-    )
+    rows, lean = _rows(recording), _lean(recording)
     time_s, thrust = rows.time_s, rows.throttle
-    is_sound = np.isfinite(rows.z_m + rows.v_m_s + rows.v_t_m_s + acceleration_target + thrust)
+    target = np.where(thrust > _NEAR_LIMIT, 0.0, np.nan) if older else recording.at("acceleration_target_m_s2", time_s)
+    is_sound = np.isfinite(rows.z_m + rows.v_m_s + rows.v_t_m_s + target + thrust)
     follows = np.isfinite(rows.z_d_m + rows.v_d_m_s + rows.a_d_m_s2)
     given, chosen = choose_parts(
         time_s,
@@ -78,28 +89,51 @@ def px4_flight(recording: Recording, name: str) -> LoggedFlight:
             Condition(lean >= LARGEST_LEAN, ReasonCode.LEANS, f"{TARGET}.thrust"),
         ),
         _is_reset(recording, rows),
-        recording.history({*LOOP_NAMES, VEHICLE}),
+        recording.history({*LOOP_NAMES, *THRUST_GAINS.values(), VEHICLE}),
         _manoeuvres(rows),
         refused,
-        Px4Loop.space.bounds,
+        {older.get(gain, gain): ends for gain, ends in Px4Loop.space.bounds.items()},
         lambda gain: Reason(code=ReasonCode.PARAMETER_MISSING, field=gain),
     )
-    parameters, logged_s = parameters_from(given), float(np.median(np.diff(recording.columns["altitude_m"].time_s)))
-    limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
-    hover = _hover(rows, acceleration_target, is_sound & (thrust > limits[0]) & (thrust < limits[1]))
     kept = [thinned(time_s, part) for part in chosen]
+    mean = float(np.mean(np.concatenate([thrust[each] for each in kept])))
+    parameters = parameters_from(in_accelerations(given, mean) if older else given)
+    logged_s = float(np.median(np.diff(recording.columns["altitude_m"].time_s)))
+    limits = parameters.thrust_min + _NEAR_LIMIT, parameters.thrust_max - _NEAR_LIMIT
+    free = is_sound & (thrust > limits[0]) & (thrust < limits[1])
+    hover = np.full(len(time_s), mean) if older else _hover(rows, target, free)
     down = np.concatenate([recording.at("descent_limit_m_s", time_s)[each] for each in kept])
-    return LoggedFlight(
+    flight = LoggedFlight(
         loop=Px4Loop(
             parameters=parameters,
-            step_s=logged_s if 0.0 < logged_s <= _EVERY_POSITION_S else estimator_step_s(given),
+            step_s=logged_s if not older and 0.0 < logged_s <= _EVERY_POSITION_S else estimator_step_s(given),
             row_s=float(np.median(np.concatenate([np.diff(time_s[each]) for each in kept]))),
             descent_m_s=float(np.median(down)) if np.isfinite(down).all() else parameters.descent_m_s,
-            hover_deviation=hover_deviation(given),
+            hover_deviation=hover_deviation({HOVER_RANGE_NAME: _ANY_HOVER, **given}),
             vehicle=int(given.get(VEHICLE, 1.0)),
+            thrust_gains_at=mean if older else None,
         ),
         segments=[_segment(recording, replace(rows, assumed_hover=hover), lean, each) for each in kept],
     )
+    return _with_feed_forward(flight) if older else flight
+
+
+def has_thrust_gains(recording: Recording) -> bool:
+    """Whether the gains are those until release 1.10, by the parameters or, where it has none, by what it logged."""
+    names = {each.name for each in recording.settings}
+    has_older = "acceleration_target_m_s2" not in recording.columns or not names.isdisjoint(THRUST_GAINS.values())
+    return has_older and names.isdisjoint(THRUST_GAINS)
+
+
+def _with_feed_forward(flight: LoggedFlight) -> LoggedFlight:
+    """The flight with what the climb rate targets have beyond the set-points: until release 1.10, set-points were
+    logged rarely or not at all, and the rates that modes fed forward, or limited, are in the targets alone."""
+    loop = flight.loop
+    beyond = [each.v_t_m_s - loop.climb_rate_targets(each) for each in flight.segments]
+    if np.mean(np.abs(np.concatenate(beyond)) > loop.target_tolerance_m_s) <= _UNEXPLAINED_SHARE:
+        return flight
+    fed = [replace(each, v_d_m_s=each.v_d_m_s + rest) for each, rest in zip(flight.segments, beyond, strict=True)]
+    return replace(flight, segments=fed, lacks=Reason(code=ReasonCode.FEED_FORWARD_UNKNOWN, field=SET_POINT))
 
 
 def _rows(recording: Recording) -> Segment:
@@ -142,7 +176,11 @@ def _lean(recording: Recording) -> Samples:
 def _flying(recording: Recording, time_s: Samples) -> Rows:
     """Rows after the ramp of a takeoff, without contact to the ground."""
     on_ground = [np.nan_to_num(recording.at(each, time_s)) > 0.0 for each in ("is_landed", "has_contact")]
-    return np.asarray((recording.at("takeoff_state", time_s) == FLIGHT) & ~np.any(on_ground, axis=0))
+    flying = recording.at("takeoff_state", time_s) == FLIGHT
+    if "takeoff_state" not in recording.columns:
+        spans = ((each.begin_s + _RAMP_S, each.end_s) for each in recording.in_air or ())
+        flying = np.any([(time_s >= begin_s) & (time_s < end_s) for begin_s, end_s in spans], axis=0)
+    return np.asarray(flying & ~np.any(on_ground, axis=0))
 
 
 def _coming_or_going(recording: Recording, time_s: Samples) -> Rows:
@@ -183,7 +221,7 @@ def _segment(recording: Recording, rows: Segment, lean: Samples, kept: NDArray[n
     at_s, thrust = time_s, part.throttle
     if "thrust" in recording.columns:
         finer = recording.columns["thrust"]
-        values = finer.values * np.interp(finer.time_s, rows.time_s, lean)
+        values = within_limits(finer.values) * np.interp(finer.time_s, rows.time_s, lean)
         between = (finer.time_s > time_s[0]) & (finer.time_s < time_s[-1]) & np.isfinite(values)
         at_s, first = np.unique(np.append(time_s, finer.time_s[between]), return_index=True)
         thrust = np.append(thrust, values[between])[first]
@@ -202,11 +240,15 @@ def _feed_forward(recording: Recording, time_s: Samples) -> tuple[Samples, Sampl
     none, NaN where no set-point is near."""
     from scipy.interpolate import CubicHermiteSpline
 
-    given_v, given_a = (recording.columns[f"given_{each}"] for each in ("climb_rate_m_s", "acceleration_m_s2"))
-    at_s, v, a = given_v.time_s, given_v.values, given_a.values
-    rates = np.where(np.isfinite(v) & np.isfinite(a), a, 0.0)
+    if "given_climb_rate_m_s" not in recording.columns:
+        return np.zeros(len(time_s)), np.zeros(len(time_s))
+    at_s, v = recording.columns["given_climb_rate_m_s"].time_s, recording.columns["given_climb_rate_m_s"].values
     if len(at_s) < 2:
         return np.full(len(time_s), np.nan), np.full(len(time_s), np.nan)
+    a = recording.at("given_acceleration_m_s2", at_s)
+    rates = np.where(np.isfinite(v) & np.isfinite(a), a, 0.0)
+    if "given_acceleration_m_s2" not in recording.columns:
+        rates = np.gradient(np.nan_to_num(v), at_s)
     v_d = CubicHermiteSpline(at_s, np.nan_to_num(v), rates)(np.clip(time_s, at_s[0], at_s[-1]))
     a_d = np.interp(time_s, at_s, np.nan_to_num(a))
     after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
@@ -220,8 +262,11 @@ def frame_of(recording: Recording) -> str:
     by_parameters = [
         kind for name, kinds in AIRFRAMES.items() for kind, values in kinds.items() if latest.get(name) in values
     ]
-    status = recording.columns.get("vehicle_type")
+    status, older = (recording.columns.get(each) for each in ("vehicle_type", "is_rotary_wing"))
     reported = [] if status is None else np.unique(status.values).tolist()
+    if older is not None:
+        armed = recording.at("arming_state", older.time_s) == ARMED
+        reported = np.unique(_WINGS - (older.values[armed] > 0.0)).tolist()
     by_status = ["VTOL" if _ROTORS in reported else _KINDS[each] for each in reported if each in _KINDS]
     return next(iter([*by_parameters, *by_status]), "")
 
@@ -240,7 +285,11 @@ def _require_columns(recording: Recording, refused: Refused) -> None:
         raise refused(Reason(code=ReasonCode.NO_DATA))
     if frame := frame_of(recording):
         raise refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
-    for each in _NEEDED:
+    latest = {each.name: each.value for each in recording.settings}
+    if recording.release.partition("-")[0] == _REVERSED and latest.get(_DERIVATIVE):
+        raise refused(Reason(code=ReasonCode.DERIVATIVE_REVERSED, field=_DERIVATIVE, named=[recording.release]))
+    needed = _NEEDED if has_thrust_gains(recording) else (*_NEEDED, *_OF_ACCELERATIONS)
+    for each in needed if "is_landed" in recording.columns else (*needed, "takeoff_state"):
         source = SOURCES[each]
         if source.message not in recording.sources:
             raise refused(Reason(code=ReasonCode.MESSAGE_MISSING, field=source.message))

@@ -225,7 +225,8 @@ def px4_loop_log(recording: Recording, *, name: str) -> LoopLog:
     columns = recording.columns
     for each in _NEEDED:
         if each not in columns:
-            raise refused(SOURCES[each].message, "is missing")
+            source = SOURCES[each]
+            raise refused(str(source) if source.message in recording.sources else source.message, "is missing")
     position_s, time_s = columns["altitude_m"].time_s, columns["thrust_target"].time_s
     takeoff = recording.at("takeoff_state", time_s)
     place = np.searchsorted(position_s, time_s, side="right") - 1

@@ -178,9 +178,9 @@ def analyze(flight: LoggedFlight) -> Analysis:
     if hover is not None and hover.is_outside:
         flight = flight.with_hover(hover.proposed)
         assess = _assessor(flight, estimate)
-    usual = loop.rules(flight.throttle_mean)
+    why = flight.lacks or _insufficient(flight, estimate)
+    usual = {} if flight.lacks else loop.rules(flight.throttle_mean)
     compared = [present, *(assess(name, gains) for name, gains in usual.items())]
-    why = _insufficient(flight, estimate)
     gains = None if why else propose(flight, estimate.few, [loop.gains, *usual.values()])
     proposed = assess("Proposed", gains) if gains else None
     if proposed is None:
@@ -226,7 +226,7 @@ def _is_better(proposed: Assessment, present: Assessment) -> bool:
 
 
 _BETTER: Final = 0.95
-_NOT_JUDGED: Final = (ReasonCode.NO_WHOLE_CHANGE, ReasonCode.SLOPE_UNKNOWN)
+_NOT_JUDGED: Final = (ReasonCode.FEED_FORWARD_UNKNOWN, ReasonCode.NO_WHOLE_CHANGE, ReasonCode.SLOPE_UNKNOWN)
 
 
 def _response(flight: LoggedFlight, estimate: CopterEstimate, gains: Mapping[str, float]) -> Response:

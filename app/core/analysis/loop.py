@@ -9,6 +9,7 @@ import numpy as np
 
 from app.core.analysis.segment import Segment, Steps
 from app.core.models.copter import BODY_SIZE, Copter, Filter
+from app.core.reasons import Reason
 from app.core.records.trajectory import Samples
 
 _V_contra = TypeVar("_V_contra", contravariant=True)
@@ -220,13 +221,14 @@ class LoggedFlight:
 
     `activity` is the standard deviation of the demanded throttle about its own 2 Hz low-pass, share of full, if it was
     recorded: the noise of an accelerometer that is not in the log follows from it. `assumed` names parameters that the
-    record lacks, so that the loop has the firmware's defaults.
+    record lacks, so that the loop has the firmware's defaults. `lacks` is why other gains cannot be predicted, if so.
     """
 
     loop: AltitudeLoop
     segments: Sequence[Segment]
     activity: float | None = None
     assumed: Sequence[str] = ()
+    lacks: Reason | None = None
 
     @property
     def error_m(self) -> float:

@@ -66,7 +66,7 @@ def _slower_damping(loop: LinearLoop[_V], vehicle: _V, factor: float) -> float:
 def least_damping(loop: LinearLoop[_V], vehicle: _V, *, late_s: float = 0.0) -> float:
     """Damping ratio of the least damped oscillation about hover, with a vehicle that follows `late_s` later; negative
     if one grows, 1 if there is none."""
-    modes = np.linalg.eigvals(loop.transition(vehicle, late_s=late_s))
+    modes = np.linalg.eigvals(loop.transition(vehicle, late_s=late_s)).astype(np.complex128)
     poles = np.log(modes[np.abs(modes) > _FORGOTTEN]) / loop.step_s
     oscillations = poles[np.abs(poles.imag) > _SLOWEST_OSCILLATION_RAD_S]
     return float(min(-oscillations.real / np.abs(oscillations), default=1.0))

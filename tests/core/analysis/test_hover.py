@@ -29,7 +29,7 @@ def ardupilot(hover: float) -> AltitudeLoop:
         (px4(0.5, 0.01), 0.52, 0.52, "outside MPC_THR_HOVER ± HTE_THR_RANGE (0.490 … 0.510)"),
         (px4(0.7), 0.89, 0.8, "near the end of MPC_THR_HOVER ± HTE_THR_RANGE (0.500 … 0.900)"),
         (px4(0.5), 0.34, 0.34, "near the end of"),
-        (px4(0.5), 0.56, 0.56, "MPC_THR_HOVER is 0.500: PX4 estimates the hover throttle in flight, but takes off"),
+        (px4(0.5), 0.56, 0.56, "MPC_THR_HOVER is 0.500: PX4 takes off with the parameter, whatever it"),
         (ardupilot(0.35), 0.53, 0.53, "MOT_THST_HOVER is 0.350: the integral has to make up for the difference"),
         (ardupilot(0.0), 0.53, 0.53, "MOT_THST_HOVER is 0.000: the integral has to make up for the difference"),
     ],

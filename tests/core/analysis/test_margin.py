@@ -18,6 +18,7 @@ from app.core.analysis.margin import (
     least_damping,
 )
 from app.core.models.copter import DISTURBANCES, FLOWN, REFERENCE, Copter, start_body
+from app.core.records.trajectory import Samples
 from bench.copters.simulation import loop_of
 from tests.core.analysis.flights import with_gains_of
 from tests.core.tuning.flying import compiled_only
@@ -90,6 +91,24 @@ def test_the_damping_is_that_of_an_oscillation_as_it_dies_away() -> None:
     decrement = np.log(heights[:-1] / heights[1:]).mean()
     seen = decrement / np.hypot(2.0 * np.pi, decrement)
     assert least_damping(gains, RACER) == pytest.approx(seen, rel=0.1)
+
+
+class Alternating:
+    """A loop whose state changes its sign from step to step."""
+
+    texts = ArduPilotLoop.texts
+    step_s = 0.02
+
+    def with_fast_gains(self, factor: float) -> "Alternating":
+        return self
+
+    def transition(self, vehicle: Copter, *, late_s: float = 0.0) -> Samples:
+        return np.diag([-0.5, 0.9])
+
+
+def test_a_state_that_changes_its_sign_in_every_step_oscillates() -> None:
+    """ln(−½) = −0.693 + π i: a damping ratio of 0.693/|…|."""
+    assert least_damping(Alternating(), STOCK) == pytest.approx(0.2154, abs=1e-4)
 
 
 def test_at_the_margin_the_loop_with_more_lag_just_begins_to_ring() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
 from app.core.control.parameter_checks import ReplicaParameters, parameter, require_within
 from app.core.errors import InputError
+from app.core.models.copter import GRAVITY_M_S2
 from app.core.reasons import Reason, ReasonCode
 
 STEP_S: Final = 1 / 125
@@ -58,6 +59,28 @@ def low_pass_gain(cutoff_hz: float, sample_s: float) -> float:
     return float(sample / (sample + np.float32(1.0) / (np.float32(2.0 * math.pi) * np.float32(cutoff_hz))))
 
 
+THRUST_GAINS: Final[Mapping[str, str]] = MappingProxyType(
+    {f"MPC_Z_VEL_{term}_ACC": f"MPC_Z_VEL_{term}" for term in ("P", "I", "D")}
+)
+"""Gains of an acceleration, each with that until release 1.10, of a share of full thrust."""
+THRUST_DEFAULTS: Final[Mapping[str, float]] = MappingProxyType(
+    {"MPC_Z_P": 1.0, "MPC_Z_VEL_P": 0.2, "MPC_Z_VEL_I": 0.02, "MPC_Z_VEL_D": 0.0}
+)
+
+
+def in_accelerations(values: Mapping[str, float], hover_thrust: float) -> dict[str, float]:
+    """Parameters by the firmware's names, with the later gains of a vehicle that hovers with this thrust, > 0."""
+    factor = GRAVITY_M_S2 / hover_thrust
+    return {**{name: values[older] * factor for name, older in THRUST_GAINS.items() if older in values}, **values}
+
+
+def in_thrusts(gains: Mapping[str, float], hover_thrust: float) -> dict[str, float]:
+    """Gains as until release 1.10, of a vehicle that hovers with this thrust; seven digits, as the firmware has."""
+    factors = dict.fromkeys(THRUST_GAINS, hover_thrust / GRAVITY_M_S2)
+    scaled = {name: float(f"{value * factors.get(name, 1.0):.7g}") for name, value in gains.items()}
+    return {THRUST_GAINS.get(name, name): value for name, value in scaled.items()}
+
+
 _PREDICTION, _IMU_RATE = "EKF2_PREDICT_US", "IMU_INTEG_RATE"
 _PREDICTION_US, _IMU_HZ = 10_000.0, 200.0
 _LONGEST_STEP_S: Final = 0.02
@@ -70,11 +93,14 @@ LOOP_NAMES: Final = (*DEFAULTS, *UNSUPPORTED, *ESTIMATOR_NAMES, HOVER_RANGE_NAME
 
 
 def estimator_step_s(values: Mapping[str, float]) -> float:
-    """Interval of the estimates, s, from the firmware's values by name: whole intervals of the IMU.
+    """Interval of the estimates that the loop takes, s, from the firmware's values by name: whole intervals of the IMU;
+    with the gains until release 1.10 the loop ran 50 times a second.
 
     Raises InputError for a value outside its range.
     """
     require_within(values, _RANGES)
+    if values.keys() & set(THRUST_GAINS.values()):
+        return _LONGEST_STEP_S
     imu_s = 1.0 / max(values.get(_IMU_RATE, _IMU_HZ), 1.0 / _LONGEST_STEP_S)
     period_s = values.get(_PREDICTION, _PREDICTION_US) / 1e6
     return min(max(imu_s * max(math.floor(period_s / imu_s + 1e-6), 1.0), imu_s), _LONGEST_STEP_S)
