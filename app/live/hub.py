@@ -23,7 +23,6 @@ from app.db.session import Database
 from app.live.link import LiveClient
 from app.live.messages import (
     FlightPhase,
-    FromWorker,
     PublishedMessage,
     Telemetry,
     VehicleLinkState,
@@ -253,7 +252,7 @@ class Live:
         self.hub = Hub()
         self.client = LiveClient(
             live_address(data_dir),
-            on_message=self._on_message,
+            on_message=self.hub.publish,
             on_link=lambda up: self.hub.publish(LinkState(worker=up)),
         )
 
@@ -272,10 +271,6 @@ class Live:
         while True:
             await asyncio.sleep(BEAT_S)
             self.hub.publish(LinkState(worker=self.client.answers))
-
-    def _on_message(self, message: FromWorker) -> None:
-        if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
-            self.hub.publish(message)
 
 
 @asynccontextmanager

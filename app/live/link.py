@@ -64,8 +64,8 @@ class LiveServer:
 
     `abort(trial_id, reason)` is called on the socket's thread and returns whether that trial is flying.
     `order(vehicle_id, order, reason, by_s)` returns a future with why the command did not reach the vehicle, or "" if
-    it did. `hello()` describes the worker to a new client. All must return at once. A request that is handled after its
-    deadline, because this process was suspended, is not carried out.
+    it did. Both must return at once. A request that is handled after its deadline, because this process was suspended,
+    is not carried out.
     """
 
     def __init__(
@@ -74,12 +74,10 @@ class LiveServer:
         *,
         abort: Callable[[int, str], bool],
         order: Callable[[int, VehicleCommandKind, str, float], Future[str]],
-        hello: Callable[[], WorkerHello],
     ) -> None:
         self._path = path
         self._abort = abort
         self._order = order
-        self._hello = hello
         self._writers: set[asyncio.StreamWriter] = set()
         self._orders: set[asyncio.Task[None]] = set()
         self._loop = asyncio.new_event_loop()
@@ -117,7 +115,7 @@ class LiveServer:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._writers.add(writer)
         try:
-            writer.write(encode(self._hello()))
+            writer.write(encode(WorkerHello()))
             while line := await reader.readline():
                 self._answer(line, writer)
         except (ConnectionError, InputError, ValueError) as error:
@@ -181,12 +179,12 @@ class LinkDownError(GainlineError):
 class LiveClient:
     """Keeps one connection to the worker at `path` and reconnects indefinitely. For one event loop only.
 
-    `on_message` receives the worker's messages. `on_link` is called when the connection is established or lost, and
-    when the worker stops or resumes answering.
+    `on_message` receives the messages that the worker publishes. `on_link` is called when the connection is
+    established or lost, and when the worker stops or resumes answering.
     """
 
     def __init__(
-        self, path: Path, *, on_message: Callable[[FromWorker], None], on_link: Callable[[bool], None]
+        self, path: Path, *, on_message: Callable[[PublishedMessage], None], on_link: Callable[[bool], None]
     ) -> None:
         self._path = path
         self._on_message = on_message
@@ -273,7 +271,6 @@ class LiveClient:
         match message:
             case WorkerHello():
                 self._writer, self._answers = writer, True
-                self._on_message(message)
                 self._on_link(True)
             case Answer(request=request):
                 if (answer := self._waiting.get(request)) is not None and not answer.done():

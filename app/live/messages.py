@@ -6,7 +6,7 @@ import hashlib
 import os
 import stat
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
@@ -84,11 +84,8 @@ class VehicleStatus(Condition):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerHello:
-    """First line from the worker to every client: its identity and the trials that it is flying."""
+    """First line from the worker to every client, which is then connected."""
 
-    pid: int
-    version: str
-    flying: list[int] = field(default_factory=list)
     type: Literal["worker"] = "worker"
 
 
