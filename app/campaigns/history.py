@@ -37,7 +37,6 @@ from app.core.tuning.predictions import is_informative
 from app.db import trajectories
 from app.db.base import JsonObject, OptionsJson, utc_now
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
-from app.db.trajectories import trajectory_of, unpack
 from app.vehicles.flight_end import FlightEnd, not_begun
 
 _INTERVAL: Final = TypeAdapter(Interval)
@@ -100,7 +99,7 @@ def donor_of(session: Session, definition: Definition) -> Flight | None:
             "been deleted or changed.",
             hint="Choose another start, or select the campaign as the donor again.",
         )
-    record = trajectory_of(session, rows[0].trajectory.id)
+    record = trajectories.trajectory_of(session, rows[0].trajectory.id)
     error = experiment_of(definition).error(record, accept_gaps=True)
     as_flown = _flight(rows[0], record, _numbers(rows[0].settings))
     return replace(as_flown, error=error, outcome="valid", predicted=None, against_gains=True)
@@ -234,7 +233,7 @@ def record_of(session: Session, row: TrialRow) -> Trajectory:
 def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
     """Unpack a trial's record. Raises StorageError that names the trial when the record is damaged."""
     try:
-        return unpack(record)
+        return trajectories.unpack(record)
     except StorageError as error:
         raise StorageError(
             f"The record of trial {row.number} of campaign {row.campaign_id} cannot be read: {error.message}",

@@ -40,8 +40,8 @@ from app.core.statistics.pairs import (
     overall_verdict,
 )
 from app.core.tuning.strategies import STRATEGIES
-from app.db import trajectories
 from app.db.models import CampaignRow, TrialRow
+from app.db.trajectories import samples_of, unpack
 from app.figures.base import Card, card_of
 from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure
 from app.figures.data import NO_CURVE, Curve
@@ -143,7 +143,7 @@ def _column(curve: Curve, grid: Samples) -> list[str]:
 def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonData:
     experiment = sides[0].experiment
     recorded = [side.row.trajectory_id for side in sides if side.row.trajectory_id is not None]
-    records = trajectories.trajectories_of(session, recorded)
+    records = {key: unpack(row) for key, row in samples_of(session, recorded).items()}
     unit = CHANNEL_UNITS[experiment.output]
     return ComparisonData(
         output_title=experiment.output.removesuffix(f"_{unit}").replace("_", " ").capitalize(),
