@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final, Self
 
-from app.accounts.permissions import Key, RequestOrigin
+from app.accounts.permissions import Key
 from app.common.errors import StorageError
 
 LINK_VALID_S: Final = 15 * 60
@@ -57,10 +57,6 @@ class Keyring:
     def value(self, key: Key) -> str:
         """Value of a browser's cookie or a script's header that presents this key."""
         return self._derived(f"key {key.name}")
-
-    def given_to(self, place: RequestOrigin) -> Key:
-        """The key that a browser at that place gets for a link."""
-        return Key.BROWSER if place is RequestOrigin.HERE else Key.REMOTE
 
     def key_of(self, shown: str) -> Key:
         """The key that this value presents; `Key.NONE` for any other value."""

@@ -155,7 +155,7 @@ def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") 
     """Exchange a link's token for a cookie, once. What the cookie permits depends on where the browser is."""
     keyring: Keyring = request.app.state.keyring
     caller = caller_of(request)
-    given = keyring.given_to(caller.place)
+    given = Key.BROWSER if caller.place is RequestOrigin.HERE else Key.REMOTE
     if not keyring.open_link(token):
         if caller.key >= given:  # the link was opened twice in the same browser
             return RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.accounts.keys_and_links import LINK_VALID_S, Keyring
-from app.accounts.permissions import Key, RequestOrigin
+from app.accounts.permissions import Key
 from app.common.errors import StorageError
 
 
@@ -45,14 +45,6 @@ def test_a_value_shows_its_key_and_nothing_near_it_does(tmp_path: Path, key: Key
     assert keyring.key_of(value) == key
     for wrong in ("", value[:-1], value + "0", value.upper(), "ü" + value[1:], key.name):
         assert keyring.key_of(wrong) == Key.NONE
-
-
-def test_what_a_link_is_worth_depends_on_where_it_is_opened(tmp_path: Path) -> None:
-    keyring = Keyring.open(tmp_path)
-    assert (keyring.given_to(RequestOrigin.HERE), keyring.given_to(RequestOrigin.ELSEWHERE)) == (
-        Key.BROWSER,
-        Key.REMOTE,
-    )
 
 
 def test_a_link_works_once_whoever_opens_it(tmp_path: Path) -> None:
