@@ -104,7 +104,7 @@ def _campaign(database: Database, name: str, flights: int, takeoffs: Takeoffs) -
                 gains = takeoffs.gains(number)
                 record = takeoffs.record(gains)
                 row = _trial(campaign_id, number, gains)
-                row.trajectory = trajectories.store_trajectory(session, record)
+                row.trajectory = trajectories.pack(record)
                 judged = score(Takeoff(), record)
                 keep_response(row, judged.response)
                 row.curve = judged.curve
@@ -146,7 +146,7 @@ def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: i
         lower, upper = band_channels(Takeoff.output)
         altitude_m = modelled["altitude_m"]
         band = {Takeoff.output: altitude_m, lower: altitude_m - 0.15, upper: altitude_m + 0.15}
-        predicted = trajectories.store_trajectory(session, Trajectory(modelled.time_s, band, "model", "simulation"))
+        predicted = trajectories.pack(Trajectory(modelled.time_s, band, "model", "simulation"))
         row = ProposalRow(
             campaign_id=campaign_id,
             history_digest=history.history_digest(
@@ -155,7 +155,7 @@ def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: i
             kind="step",
             gains=gains,
             predicted_error=0.21,
-            predicted_id=predicted.id,
+            predicted=predicted,
             explanation=asdict(Explanation(summary="A step of the gradient.")),
             gate=_gate(),
             stop_verdict={

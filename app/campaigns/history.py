@@ -22,6 +22,7 @@ from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     CAMPAIGN_TRANSITIONS,
     FLIGHT_TRANSITIONS,
+    FLOWN_TRIAL_STATES,
     HISTORY_TRIAL_STATES,
     NOT_AGAINST_GAINS,
     TRIAL_TRANSITIONS,
@@ -37,16 +38,10 @@ from app.core.tuning.predictions import is_informative
 from app.db import trajectories
 from app.db.base import JsonObject, OptionsJson, utc_now
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
-from app.db.trajectories import trajectory_of, unpack
 from app.vehicles.flight_end import FlightEnd, not_begun
 
 _INTERVAL: Final = TypeAdapter(Interval)
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
-
-FLOWN: Final = frozenset(
-    {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
-)
-"""States of trials that have left the ground."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -100,7 +95,7 @@ def donor_of(session: Session, definition: Definition) -> Flight | None:
             "been deleted or changed.",
             hint="Choose another start, or select the campaign as the donor again.",
         )
-    record = trajectory_of(session, rows[0].trajectory.id)
+    record = trajectories.trajectory_of(session, rows[0].trajectory.id)
     error = experiment_of(definition).error(record, accept_gaps=True)
     as_flown = _flight(rows[0], record, _numbers(rows[0].settings))
     return replace(as_flown, error=error, outcome="valid", predicted=None, against_gains=True)
@@ -109,17 +104,6 @@ def donor_of(session: Session, definition: Definition) -> Flight | None:
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
     """The flights without samples and parameters, for checks that look at gains only."""
     return tuple(_flight(row, _NOTHING, {}) for row in in_history(trials))
-
-
-def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
-    """The scored flights in their order, with gains and errors only, so that many are read quickly."""
-    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
-        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
-    )
-    return tuple(
-        Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
-        for number, gains, error in session.execute(wanted.order_by(TrialRow.number))
-    )
 
 
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
@@ -133,7 +117,11 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 
     Trials need not fly in the order of their numbers.
     """
-    flown = [(row.flown_at, row.number, row) for row in trials if row.state in FLOWN and row.flown_at is not None]
+    flown = [
+        (row.flown_at, row.number, row)
+        for row in trials
+        if row.state in FLOWN_TRIAL_STATES and row.flown_at is not None
+    ]
     return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
 
 
@@ -234,7 +222,7 @@ def record_of(session: Session, row: TrialRow) -> Trajectory:
 def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
     """Unpack a trial's record. Raises StorageError that names the trial when the record is damaged."""
     try:
-        return unpack(record)
+        return trajectories.unpack(record)
     except StorageError as error:
         raise StorageError(
             f"The record of trial {row.number} of campaign {row.campaign_id} cannot be read: {error.message}",

@@ -24,9 +24,9 @@ from app.core.experiments.base import Check, Experiment, ParameterDistribution, 
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult
 from app.core.tuning.stop_rules import Reason, StopVerdict
-from app.db import trajectories
 from app.db.base import JsonObject, added, utc_now
 from app.db.models import CampaignRow, ProposalRow, TrialRow
+from app.db.trajectories import pack
 from app.jobs import service as jobs
 
 PROPOSAL_JOB: Final = "proposal"
@@ -64,14 +64,13 @@ def store_proposal(session: Session, campaign_id: int, computed: ProposalComputa
     """
     campaign = repository.get_campaign(session, campaign_id)
     proposal = computed.proposal
-    predicted = None if proposal.predicted is None else trajectories.store_trajectory(session, proposal.predicted)
     row = ProposalRow(
         campaign_id=campaign_id,
         history_digest=computed.history_digest,
         kind=proposal.kind,
         gains=proposal.gains,
         predicted_error=proposal.predicted_error,
-        predicted_id=None if predicted is None else predicted.id,
+        predicted=None if proposal.predicted is None else pack(proposal.predicted),
         explanation=asdict(proposal.explanation),
         gate=gate_json(computed.gate),
         stop_verdict=asdict(computed.stop_verdict),
@@ -239,9 +238,10 @@ def history_changed(session: Session, row: CampaignRow) -> None:
 
 def safe_gains_changed(session: Session, vehicle_id: int) -> None:
     """Request new proposals for the vehicle's unflown campaigns, which start from its safe gains."""
-    for row in repository.unflown_on(session, vehicle_id):
-        cancel_outdated(session, row)
-        request_proposal(session, row)
+    for row in repository.of_vehicle(session, vehicle_id):
+        if row.definition_digest is None:
+            cancel_outdated(session, row)
+            request_proposal(session, row)
 
 
 _CHOICE_KINDS: Final[Mapping[str, ChoiceKind]] = {

@@ -18,6 +18,7 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.trials.schemas import GroupBrief
 from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
+from app.common.states import FLOWN_TRIAL_STATES
 from app.compare.schemas import (
     ComparedFlight,
     FlightComparison,
@@ -40,8 +41,8 @@ from app.core.statistics.pairs import (
     overall_verdict,
 )
 from app.core.tuning.strategies import STRATEGIES
-from app.db import trajectories
 from app.db.models import CampaignRow, TrialRow
+from app.db.trajectories import samples_of, unpack
 from app.figures.base import Card, card_of
 from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure
 from app.figures.data import NO_CURVE, Curve
@@ -50,7 +51,6 @@ from app.fleet import service as fleet
 from app.vehicles.registry import VEHICLE_KINDS
 
 LABELS: Final = "ABCDEFGHIJKLMNOPQRST"
-MAX_FLIGHTS: Final = len(LABELS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,7 +143,7 @@ def _column(curve: Curve, grid: Samples) -> list[str]:
 def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonData:
     experiment = sides[0].experiment
     recorded = [side.row.trajectory_id for side in sides if side.row.trajectory_id is not None]
-    records = trajectories.trajectories_of(session, recorded)
+    records = {key: unpack(row) for key, row in samples_of(session, recorded).items()}
     unit = CHANNEL_UNITS[experiment.output]
     return ComparisonData(
         output_title=experiment.output.removesuffix(f"_{unit}").replace("_", " ").capitalize(),
@@ -268,7 +268,7 @@ def _refusal(
         return f"there is no trial {trial_id}; its campaign may have been deleted"
     if trial_id in trial_ids[:index]:
         return f"flight {row.number} of campaign {row.campaign_id} is listed twice"
-    if row.state not in history.FLOWN:
+    if row.state not in FLOWN_TRIAL_STATES:
         return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
     first = next(found[other] for other in trial_ids if other in found)
     own, wanted = experiments[row.campaign_id], experiments[first.campaign_id]
@@ -295,12 +295,11 @@ def vehicle_name(campaign: CampaignRow) -> str:
 def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
     """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
     row, campaign = side.row, side.row.campaign
-    kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
     strategy = STRATEGIES[campaign.strategy]
     options = fleet.options_of(campaign)
     found = [
         FlightSetting(title="Vehicle", unit="", value=vehicle_name(campaign)),
-        *_options(options, () if kind is None else kind.options),
+        *_options(options, VEHICLE_KINDS[campaign.vehicle.kind].options),
         FlightSetting(title="Experiment", unit="", value=side.experiment.title),
         *_options(
             with_defaults(campaign.definition["experiment_options"], side.experiment.options), side.experiment.options
@@ -336,15 +335,9 @@ def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference
 
 
 def _options(values: Mapping[str, OptionValue], known: Iterable[Option]) -> list[FlightSetting]:
-    described = {option.name: option for option in known}
-    return [
-        FlightSetting(
-            title=described[name].title if name in described else name,
-            unit=described[name].unit if name in described else "",
-            value=value,
-        )
-        for name, value in values.items()
-    ]
+    described = {option.name: (option.title, option.unit) for option in known}
+    titled = ((*described.get(name, (name, "")), value) for name, value in values.items())
+    return [FlightSetting(title=title, unit=unit, value=value) for title, unit, value in titled]
 
 
 def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> list[FlightDifference]:

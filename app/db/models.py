@@ -353,6 +353,8 @@ class JobRow(Base, Reported, _Dated):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
+    campaign: Mapped[CampaignRow | None] = relationship()
+
 
 class EventRow(Base, Numbered):
     """The outbox: what changed, in order."""

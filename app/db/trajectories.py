@@ -21,7 +21,6 @@ from sqlalchemy.orm import Session, defer, undefer
 from app.common.errors import StorageError
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Trajectory
-from app.db.base import added
 from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
 
@@ -29,11 +28,9 @@ VERSION: Final = 1
 _TIME: Final = "time_s"
 _WIDTH: Final = 4
 
-Table = NDArray[np.float32]
-
 
 def pack(trajectory: Trajectory) -> TrajectoryRow:
-    """Pack a trajectory as a row to be stored.
+    """Pack a trajectory as a row to be stored; the database refuses any later change of it.
 
     Raises TrajectoryError when single precision cannot hold it: a number is too large, or time stamps collapse.
     """
@@ -75,7 +72,7 @@ def unpack(packed: TrajectoryRow) -> Trajectory:
     return Trajectory(numbers[0], dict(zip(packed.columns[1:], numbers[1:], strict=True)), packed.source, packed.clock)
 
 
-def _require_storable(columns: list[str], table: Table) -> None:
+def _require_storable(columns: list[str], table: NDArray[np.float32]) -> None:
     if table.shape[1] == 0:
         raise TrajectoryError(
             "This record is empty.",
@@ -123,11 +120,6 @@ def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
     return unpack(samples_of(session, [trajectory_id])[trajectory_id])
 
 
-def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
-    """Several stored trajectories, by id."""
-    return {identity: unpack(row) for identity, row in samples_of(session, trajectory_ids).items()}
-
-
 def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
     """Several stored trajectories, by id, without the damaged ones."""
     found: dict[int, Trajectory] = {}
@@ -135,14 +127,6 @@ def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, 
         with suppress(StorageError):
             found[identity] = unpack(row)
     return found
-
-
-def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
-    """Store a trajectory; the database refuses any later change.
-
-    Raises TrajectoryError when single precision cannot hold it.
-    """
-    return added(session, pack(trajectory))
 
 
 _NAMED: Final = 5
@@ -170,10 +154,8 @@ def damaged_trials(session: Session, campaign_id: int | None = None) -> list[Tri
     rows = session.scalars(lean.order_by(TrialRow.campaign_id, TrialRow.number)).all()
     for first in range(0, len(rows), _AT_ONCE):
         some = {row.trajectory_id: row for row in rows[first : first + _AT_ONCE] if row.trajectory_id is not None}
-        records = samples_of(session, some)
-        damaged += [row for identity, row in some.items() if not is_intact(records[identity])]
-        for record in records.values():
-            session.expire(record, ["data"])
+        readable = readable_of(session, some)
+        damaged += [row for identity, row in some.items() if identity not in readable]
     return damaged
 
 

@@ -23,14 +23,13 @@ from app.fleet.schemas import (
 from app.live.messages import NO_LINK
 from app.web.dependencies import (
     CurrentDatabase,
-    CursorText,
     Id,
     IdempotentPost,
-    Limit,
     Live,
     Reader,
     ReadVersion,
     RequestContextDep,
+    WantedPart,
     Writer,
     json_only,
 )
@@ -39,9 +38,9 @@ router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depe
 
 
 @router.get("")
-def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None) -> Page[Vehicle]:
+def list_vehicles(session: Reader, part: WantedPart) -> Page[Vehicle]:
     """Every registered vehicle, and every shared simulation that a campaign has used."""
-    return service.list_vehicles(session, limit=limit, cursor=cursor)
+    return service.list_vehicles(session, part)
 
 
 @router.post("", status_code=status.HTTP_201_CREATED)
@@ -97,15 +96,15 @@ def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: 
 
 
 @router.get("/{vehicle_id}/acts")
-def list_acts(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[VehicleAct]:
+def list_acts(session: Reader, vehicle_id: Id, part: WantedPart) -> Page[VehicleAct]:
     """Acts of the vehicle, newest first: requests outside its flights."""
-    return views.acts_view(session, vehicle_id, limit=limit, cursor=cursor)
+    return views.acts_view(session, vehicle_id, part)
 
 
 @router.get("/{vehicle_id}/ledger")
-def list_given_gains(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[GivenGains]:
+def list_given_gains(session: Reader, vehicle_id: Id, part: WantedPart) -> Page[GivenGains]:
     """Every gain set that the vehicle was given, newest first: in flights, restored after them, and by acts."""
-    return views.ledger_view(session, vehicle_id, limit=limit, cursor=cursor)
+    return views.ledger_view(session, vehicle_id, part)
 
 
 @router.post("/{vehicle_id}/land", status_code=status.HTTP_202_ACCEPTED)
@@ -121,13 +120,8 @@ async def stop_motors(
     """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
     The database is read first only for a client that may not command real vehicles, to see whether this is one."""
     if not is_allowed(Permission.STOP, asking.caller):
-        await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
+        await run_in_threadpool(commands.require_may_stop_motors, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The command to stop the motors has been sent.")
-
-
-def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: RequestContextDep) -> None:
-    with database.read() as session:
-        commands.require_may_stop_motors(session, vehicle_id, asking)
 
 
 async def _order(

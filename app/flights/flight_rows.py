@@ -264,7 +264,7 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     end = outcome.gains_left(outcome.ended if flight.end is None else flight.end, flight.safe_gains)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
-            _capture(session, flight, replace(outcome.record, end=end))
+            _capture(flight, replace(outcome.record, end=end))
             _end(flight, FlightState.ABORTED if outcome.record.ending == "aborted" else FlightState.LANDED, end)
             proposals.finish_flying(session, flight.campaign)
         elif outcome.lifted_off:
@@ -307,7 +307,7 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
     flight = _read(session, flight_id)
     if flight.trial.state != TrialState.LOST:
         return
-    _capture(session, flight, record)
+    _capture(flight, record)
     proposals.history_changed(session, flight.campaign)
 
 
@@ -349,8 +349,8 @@ def _record_doubts(flight: FlightRow, outcome: FlightOutcome) -> None:
         fleet.doubt_gains(flight.vehicle)
 
 
-def _capture(session: Session, flight: FlightRow, record: FlightRecord) -> None:
-    capture(session, flight.trial, record.trajectory, ending=record.ending, end=record.end)
+def _capture(flight: FlightRow, record: FlightRecord) -> None:
+    capture(flight.trial, record.trajectory, ending=record.ending, end=record.end)
     flight.trial.settings = dict(record.settings)
     flight.battery_v_before = battery_v(record.trajectory, 0)
     flight.battery_v_after = battery_v(record.trajectory, -1)

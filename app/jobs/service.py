@@ -5,9 +5,8 @@ For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it co
 `requeue_job` when it has to end before that.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from datetime import datetime, timedelta
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -21,8 +20,8 @@ from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.db.base import JsonObject, added, utc_now
-from app.db.models import CampaignRow, JobRow
-from app.db.pages import Order, page_of
+from app.db.models import JobRow
+from app.db.pages import Order, Part, page_of
 
 
 class Job(Schema):
@@ -175,26 +174,18 @@ def latest_ordered(session: Session, kind: str, name: str, states: Collection[Jo
     return session.scalar(_newest(kind).where(_is_order(name), JobRow.state.in_(states)))
 
 
-def latest_result(session: Session, kind: str, name: str) -> JobRow | None:
-    """The newest job of that kind and name that has a result."""
-    found = _newest(kind).where(_is_order(name), JobRow.state == JobState.DONE, JobRow.result.is_not(None))
-    return session.scalar(found)
-
-
-def list_jobs(
-    session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int, cursor: str | None
-) -> Page[Job]:
+def list_jobs(session: Session, part: Part, *, states: Collection[JobState], campaign_id: int | None) -> Page[Job]:
     """Page of jobs, newest first."""
     wanted = select(JobRow)
     if states:
         wanted = wanted.where(JobRow.state.in_(states))
     if campaign_id is not None:
         wanted = wanted.where(JobRow.campaign_id == campaign_id)
-    return page_of(session, wanted, _NEWEST_FIRST, cursor=cursor, limit=limit, view=partial(job_views, session))
+    return page_of(session, wanted, _NEWEST_FIRST, part, lambda rows: [job_view(row) for row in rows])
 
 
 def get_job(session: Session, job_id: int) -> Job:
-    return job_view(session, _one(session, job_id))
+    return job_view(_one(session, job_id))
 
 
 def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> JobLog:
@@ -209,8 +200,7 @@ def cancel_job(session: Session, job_id: int) -> Job:
     row = _one(session, job_id)
     check_action(JOB_ACTIONS, "cancel", row.state, _name(row))
     _move(row, JobState.CANCELLED)
-    session.flush()
-    return job_view(session, row)
+    return job_view(row)
 
 
 def retry_job(session: Session, job_id: int) -> Job:
@@ -219,28 +209,17 @@ def retry_job(session: Session, job_id: int) -> Job:
     check_action(JOB_ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
     row.attempts, row.problem, row.finished_at = 0, None, None
-    session.flush()
-    return job_view(session, row)
+    return job_view(row)
 
 
-def job_view(session: Session, row: JobRow) -> Job:
-    return job_views(session, [row])[0]
-
-
-def job_views(session: Session, rows: Sequence[JobRow]) -> list[Job]:
-    ids = {row.campaign_id for row in rows if row.campaign_id is not None}
-    named = session.execute(select(CampaignRow.id, CampaignRow.name).where(CampaignRow.id.in_(ids)))
-    names = {row.id: row.name for row in named}
-    return [
-        Job.view_of(
-            row,
-            name=_ordered(row),
-            campaign_name=None if row.campaign_id is None else names.get(row.campaign_id),
-            remaining_s=_remaining_s(row),
-            actions=allowed(JOB_ACTIONS, row.state),
-        )
-        for row in rows
-    ]
+def job_view(row: JobRow) -> Job:
+    return Job.view_of(
+        row,
+        name=_ordered(row),
+        campaign_name=None if row.campaign is None else row.campaign.name,
+        remaining_s=_remaining_s(row),
+        actions=allowed(JOB_ACTIONS, row.state),
+    )
 
 
 def job_problem(row: JobRow) -> Trouble | None:

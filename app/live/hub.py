@@ -23,12 +23,10 @@ from app.db.session import Database
 from app.live.link import LiveClient
 from app.live.messages import (
     FlightPhase,
-    FromWorker,
     PublishedMessage,
     Telemetry,
     VehicleLinkState,
     VehicleStatus,
-    encode,
     live_address,
 )
 
@@ -38,9 +36,6 @@ WAITING_CHANGES: Final = 2000
 """A stream that lags behind by more changes is ended; its client reconnects with the last id and misses none."""
 WAITING_TELEMETRY: Final = 100
 """A stream that lags behind by more live messages loses the oldest; more than 3 s of one flight and its vehicle."""
-
-WRITTEN: Final = 2 * WAITING_TELEMETRY
-"""Live messages whose JSON is cached: every stream sends the same, and encoding it for each would delay an abort."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +102,6 @@ class Hub:
         self._subscriptions: set[Subscription] = set()
         self._flights: dict[int, tuple[Telemetry, float]] = {}
         self._vehicles: dict[int, tuple[VehicleStatus, float]] = {}
-        self._written: dict[int, tuple[PublishedMessage, str]] = {}
         self._open = True
 
     @contextmanager
@@ -173,15 +167,6 @@ class Hub:
         before.samples.extend(message.samples)
         return replace(message, samples=before.samples)
 
-    def text(self, item: PublishedMessage) -> str:
-        """JSON of a message, encoded once for all streams."""
-        known = self._written.get(id(item))
-        if known is None:  # the item is kept with its text, so that no other object can get its id
-            known = self._written[id(item)] = item, encode(item).decode().rstrip()
-            if len(self._written) > WRITTEN:
-                del self._written[next(iter(self._written))]
-        return known[1]
-
     def close(self) -> None:
         """End every stream, so that the server can stop at once."""
         self._open = False
@@ -206,40 +191,19 @@ def changes_after(database: Database, event_id: int) -> Iterator[EventRow]:
         event_id = batch[-1].id
 
 
-class OutboxTail:
-    """A thread that calls `publish(change)` for every event committed after `start`."""
-
-    def __init__(self, database: Database, publish: Callable[[EventRow], None]) -> None:
-        self._database = database
-        self._publish = publish
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="outbox tail", daemon=True)
-
-    def start(self) -> None:
-        """Note the present end of the outbox, and start the thread."""
-        with self._database.read() as session:
-            self._last = latest_event_id(session)
-        self._thread.start()
-
-    def stop(self) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                self._follow()
-            except (StorageError, DBAPIError) as error:
-                _log.error("the outbox cannot be read", why=str(error))
-                self._stop.wait(PAUSE_AFTER_TROUBLE_S)
-
-    def _follow(self) -> None:
-        with DatabaseWatch(self._database.file) as watch:
-            while not self._stop.is_set():
-                for change in changes_after(self._database, self._last):
-                    self._publish(change)
-                    self._last = change.id
-                watch.wait(self._stop, LOOK_ANYWAY_S)
+def follow_outbox(database: Database, last: int, publish: Callable[[EventRow], None], stop: threading.Event) -> None:
+    """Call `publish` for every event committed after the `last` one, until `stop` is set."""
+    while not stop.is_set():
+        try:
+            with DatabaseWatch(database.file) as watch:
+                while not stop.is_set():
+                    for change in changes_after(database, last):
+                        publish(change)
+                        last = change.id
+                    watch.wait(stop, LOOK_ANYWAY_S)
+        except (StorageError, DBAPIError) as error:
+            _log.error("the outbox cannot be read", why=str(error))
+            stop.wait(PAUSE_AFTER_TROUBLE_S)
 
 
 BEAT_S: Final = 3.0
@@ -253,7 +217,7 @@ class Live:
         self.hub = Hub()
         self.client = LiveClient(
             live_address(data_dir),
-            on_message=self._on_message,
+            on_message=self.hub.publish,
             on_link=lambda up: self.hub.publish(LinkState(worker=up)),
         )
 
@@ -273,10 +237,6 @@ class Live:
             await asyncio.sleep(BEAT_S)
             self.hub.publish(LinkState(worker=self.client.answers))
 
-    def _on_message(self, message: FromWorker) -> None:
-        if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
-            self.hub.publish(message)
-
 
 @asynccontextmanager
 async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
@@ -288,8 +248,11 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
         with suppress(RuntimeError):  # the loop has ended
             loop.call_soon_threadsafe(live.hub.publish, change)
 
-    tail = OutboxTail(database, publish)
-    await asyncio.to_thread(tail.start)
+    with database.read() as session:
+        last = latest_event_id(session)
+    stop = threading.Event()
+    tail = threading.Thread(target=follow_outbox, args=(database, last, publish, stop), name="outbox", daemon=True)
+    tail.start()
     running = [asyncio.create_task(work) for work in (live.client.run(), live.client.watch(), live.beat())]
     try:
         yield live
@@ -297,7 +260,6 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
         live.hub.close()
         for task in running:
             task.cancel()
-        for task in running:
-            with suppress(asyncio.CancelledError):
-                await task
-        await asyncio.to_thread(tail.stop)
+        await asyncio.gather(*running, return_exceptions=True)
+        stop.set()
+        await asyncio.to_thread(tail.join)

@@ -108,7 +108,7 @@ def request_run(session: Session, name: str, *, full: bool) -> Job:
     row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, ACTIVE_STATES) or jobs.enqueue_job(
         session, REPRODUCTION_JOB, order={"name": name, "full": full}
     )
-    return jobs.job_view(session, row)
+    return jobs.job_view(row)
 
 
 def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> Card:
@@ -131,7 +131,7 @@ def _registered(name: str) -> Entry:
 
 def _summary(session: Session, each: Entry) -> dict[str, object]:
     """What the registry does not know of a reproduction."""
-    latest = jobs.latest_result(session, REPRODUCTION_JOB, each.name)
+    latest = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, {JobState.DONE})
     return {
         "figures": [{"name": figure_name, "title": title} for figure_name, title in each.figures.items()],
         "job": _open_job(session, each, latest),
@@ -145,7 +145,7 @@ def _open_job(session: Session, each: Entry, latest: JobRow | None) -> Job | Non
         row = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, CAME_TO_NOTHING)
         if row is None or (latest is not None and row.id < latest.id):
             return None
-    return jobs.job_view(session, row)
+    return jobs.job_view(row)
 
 
 def _latest_run(row: JobRow) -> LatestRun | None:
@@ -161,7 +161,7 @@ def _latest_run(row: JobRow) -> LatestRun | None:
 
 def _result(session: Session, name: str) -> Result:
     """The newest result; an empty one without any, or if it is of another version of the program."""
-    row = jobs.latest_result(session, REPRODUCTION_JOB, name)
+    row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, {JobState.DONE})
     if row is not None:
         with suppress(ValidationError):
             return STORED.validate_python(row.result)

@@ -21,7 +21,6 @@ from typing import Final
 
 import structlog
 
-from app import __version__
 from app.campaigns.computation import warm_up
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposals import PROPOSAL_JOB
@@ -40,7 +39,7 @@ from app.flights.runner import FlightRunner
 from app.flights.worker_part import AbortRegistry, WorkerPart
 from app.jobs.runner import JobRunner, recover
 from app.live.link import LiveServer
-from app.live.messages import PublishedMessage, WorkerHello, live_address
+from app.live.messages import PublishedMessage, live_address
 from app.processes import when_parent_ends
 from app.processes.calls import ComputePool
 from app.processes.locks import LockedError, exclusive
@@ -183,7 +182,6 @@ class Worker:
             live_address(part.data_dir),
             abort=sessions.abort,
             order=sessions.order,
-            hello=lambda: WorkerHello(pid=os.getpid(), version=__version__, flying=self.abort_registry.trial_ids()),
         )
         pool = FlightProcessPool(part.data_dir, part.clock)
         return sessions, FlightRunner(part, session=sessions.session, pool=pool), live

@@ -202,10 +202,7 @@ _REASONS: Final[Mapping[str, str]] = {
 """By the validator's type of error, with its limits."""
 
 _ABOUT_FIELDS: Final = frozenset({"extra_forbidden", "model_type", "model_attributes_type"})
-_QUOTED: Final = frozenset(name for name in _REASONS if name not in {"missing", "extra_forbidden"}) - {
-    "string_too_short",
-    "string_too_long",
-}
+_QUOTED: Final = _REASONS.keys() - {"missing", "extra_forbidden", "string_too_short", "string_too_long"}
 
 
 def reason_of(found: Mapping[str, Any], schema: object = None) -> str:
@@ -252,6 +249,8 @@ def _model_in(schema: object) -> type[BaseModel] | None:
 
 async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if isinstance(error.__cause__, GainlineError):  # the framework passes on no other error while it reads a body
+        return problem_response(error.__cause__)
     detail, hint = str(error.detail), "Correct the request and send it again."
     if error.status_code in _HTTP:
         sentence, hint = _HTTP[error.status_code]

@@ -12,9 +12,10 @@ from sqlalchemy.exc import IntegrityError
 
 from app.common.errors import StorageError
 from app.common.states import FlightState, JobState, VehicleState
+from app.db.base import added
 from app.db.models import CampaignRow, EventRow, FlightRow, JobRow, TrajectoryRow, VehicleRow
 from app.db.session import Database
-from app.db.trajectories import store_trajectory
+from app.db.trajectories import pack
 from tests.builders import create_campaign, create_climb, create_ready_campaign, create_trial
 from tests.conftest import Listen
 
@@ -122,7 +123,7 @@ def test_a_file_that_is_not_a_database_is_reported_in_words(tmp_path: Path) -> N
 
 def test_a_stored_trajectory_cannot_be_changed(database: Database) -> None:
     with database.write() as session:
-        row_id = store_trajectory(session, create_climb()).id
+        row_id = added(session, pack(create_climb())).id
     with pytest.raises(IntegrityError, match="never changed"), database.write() as session:
         session.get_one(TrajectoryRow, row_id).source = "elsewhere"
 

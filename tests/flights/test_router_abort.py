@@ -1,6 +1,5 @@
 """An abort goes straight to the worker, whatever the database is doing."""
 
-import os
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
@@ -12,7 +11,7 @@ from app.common.settings import Settings
 from app.db import session as session_module
 from app.db.session import Database
 from app.live.link import LiveServer
-from app.live.messages import WorkerHello, live_address
+from app.live.messages import live_address
 from tests.builders import get
 from tests.waiting import eventually
 
@@ -23,10 +22,6 @@ THREADS_OF_A_SERVER = 40
 def long_wait_for_the_database(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fifty requests begin to wait and are heard of again in it, on any machine. Before any connection is opened."""
     monkeypatch.setattr(session_module, "_BUSY_TIMEOUT_MS", 60_000)
-
-
-def hello() -> WorkerHello:
-    return WorkerHello(pid=os.getpid(), version="test", flying=[7])
 
 
 def connections_in_use(database: Database) -> int:
@@ -46,7 +41,7 @@ def test_an_abort_passes_while_every_thread_waits_for_the_database(
         return True
 
     with (
-        LiveServer(live_address(settings.data_dir), abort=abort, order=lambda *_: Future(), hello=hello),
+        LiveServer(live_address(settings.data_dir), abort=abort, order=lambda *_: Future()),
         ThreadPoolExecutor(THREADS_OF_A_SERVER + 10) as people,
     ):
         eventually(lambda: get(client, "/api/health")["worker"] == "running")

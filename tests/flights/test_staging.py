@@ -21,7 +21,7 @@ from app.flights import flight_rows
 from app.flights.flight_rows import FlightOutcome
 from app.flights.service import record_abort
 from app.live.link import LiveServer
-from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
+from app.live.messages import UnreadyReason, VehicleStatus, live_address
 from app.main import create_app
 from app.vehicles.base import FlightRecord
 from app.vehicles.flight_end import (
@@ -68,7 +68,6 @@ def worker_link(settings: Settings) -> Iterator[LiveServer]:
         live_address(settings.data_dir),
         abort=lambda _trial, _reason: False,
         order=lambda *_: Future(),
-        hello=lambda: WorkerHello(pid=1, version="test"),
     ) as server:
         yield server
 

@@ -21,14 +21,13 @@ from app.live.hub import live_link
 from app.live.link import SLOW_CLIENT_BYTES, LinkDownError, LiveClient, LiveServer
 from app.live.messages import (
     LONGEST_PATH_BYTES,
-    Abort,
     Answer,
     FlightPhase,
     FromWorker,
-    Ping,
+    PublishedMessage,
+    Request,
     Telemetry,
     VehicleCommandKind,
-    VehicleOrder,
     VehicleStatus,
     WorkerHello,
     decode,
@@ -73,16 +72,14 @@ def server(
     abort: Callable[[int, str], bool] = lambda _trial, _why: False,
     order: Callable[[int, VehicleCommandKind, str, float], Future[str]] = lambda *_: told("nobody has its link"),
 ) -> LiveServer:
-    return LiveServer(
-        path, abort=abort, order=order, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2])
-    )
+    return LiveServer(path, abort=abort, order=order)
 
 
 class Web:
     """A web process's end: everything it heard, and whether its link is up."""
 
     def __init__(self, path: Path) -> None:
-        self.heard: list[FromWorker] = []
+        self.heard: list[PublishedMessage] = []
         self.links: list[bool] = []
         self.client = LiveClient(path, on_message=self.heard.append, on_link=self.links.append)
 
@@ -108,7 +105,7 @@ async def connected(path: Path) -> AsyncIterator[Web]:
         telemetry(),
         FlightPhase(campaign_id=1, trial_id=2, phase="landed", note="on the ground"),
         status(),
-        WorkerHello(pid=1, version="0", flying=[3]),
+        WorkerHello(),
     ],
     ids=lambda message: message.type,
 )
@@ -150,9 +147,8 @@ def test_telemetry_and_phases_arrive_in_order(tmp_path: Path) -> None:
                 for message in sent:
                     worker.publish(message)
                 worker.publish(FlightPhase(campaign_id=1, trial_id=2, phase="landed"))
-                await web.until(lambda: len(web.heard) == 52)
-                assert web.heard[0] == WorkerHello(pid=os.getpid(), version="test", flying=[2])
-                assert web.heard[1:51] == sent
+                await web.until(lambda: len(web.heard) == 51)
+                assert web.heard[:50] == sent
 
     asyncio.run(scenario())
 
@@ -213,10 +209,8 @@ def test_a_late_command_is_not_executed(tmp_path: Path) -> None:
         reader = web.makefile("rb")
         reader.readline()
         for request, (by_s, reason) in enumerate(((late_s, "late"), (early_s, "in time"))):
-            web.sendall(encode(Abort(request=request, trial_id=2, reason=f"abort {reason}", by_s=by_s)))
-            web.sendall(
-                encode(VehicleOrder(request=10 + request, vehicle_id=5, order="motors off", reason=reason, by_s=by_s))
-            )
+            web.sendall(encode(Request(request=request, kind="abort", of=2, reason=f"abort {reason}", by_s=by_s)))
+            web.sendall(encode(Request(request=10 + request, kind="motors off", of=5, reason=reason, by_s=by_s)))
         answers = [decode(reader.readline()) for _ in range(4)]
     accepted = {answer.request: answer.accepted for answer in answers if isinstance(answer, Answer)}
     assert accepted == {0: False, 10: False, 1: True, 11: True}
@@ -363,8 +357,10 @@ def test_the_web_process_ends_while_a_worker_owes_it_an_answer(tmp_path: Path, m
         owing = asyncio.Event()
 
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            writer.write(encode(WorkerHello(pid=1, version="test", flying=[])))
-            assert isinstance(decode(await reader.readline()), Ping)
+            writer.write(encode(WorkerHello()))
+            asked = decode(await reader.readline())
+            assert isinstance(asked, Request)
+            assert asked.kind == "ping"
             owing.set()
             await reader.read()
             writer.close()

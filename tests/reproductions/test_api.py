@@ -8,6 +8,7 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.states import JobState
 from app.core.errors import InputError
 from app.db.session import Database
 from app.jobs import service as jobs
@@ -107,7 +108,7 @@ def test_only_the_newest_result_is_kept(client: TestClient, database: Database) 
         finish(database, claim(database))
     with database.read() as session:
         assert [jobs.get_job(session, job_id).state for job_id in (1, 2)] == ["done", "done"]
-        latest = jobs.latest_result(session, REPRODUCTION_JOB, "controller")
+        latest = jobs.latest_ordered(session, REPRODUCTION_JOB, "controller", {JobState.DONE})
         assert latest is not None
         assert latest.id == 2
         found = jobs.latest_ordered(session, REPRODUCTION_JOB, "controller", ())

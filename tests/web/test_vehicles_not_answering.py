@@ -1,13 +1,12 @@
 """What `/api/health` says of vehicles that no order reaches."""
 
-import os
 from concurrent.futures import Future
 
 from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
 from app.live.link import LiveServer
-from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello, live_address
+from app.live.messages import VehicleLinkState, VehicleStatus, live_address
 from tests.builders import get
 from tests.waiting import eventually
 
@@ -25,7 +24,6 @@ def test_a_vehicle_whose_process_stands_still_is_named_until_it_goes_on(client: 
         live_address(settings.data_dir),
         abort=lambda *_: False,
         order=lambda *_: Future(),
-        hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[]),
     ) as worker:
         eventually(lambda: get(client, "/api/health")["worker"] == "running")
         worker.publish(status(4, "gone", "The telemetry log cannot be written."))

@@ -8,7 +8,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -52,18 +51,16 @@ from app.core.records.metrics import StepResponse, step_response
 from app.core.records.plausibility import Reading, find_readings, read_as
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import battery_v
-from app.db import trajectories
 from app.db.base import utc_now
 from app.db.models import TrialRow
+from app.db.trajectories import pack, unpack
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.processes.calls import FILE, run_limited
 from app.vehicles.flight_end import FlightEnd, Requester
 
 CURVE_POINTS: Final = 48
-_CAUSES: Final[Mapping[Requester | None, AbortCause]] = MappingProxyType(
-    {None: "limit", Requester.PROGRAM_STOPPED: "something else"}
-)
+_CAUSES: Final[Mapping[Requester | None, AbortCause]] = {None: "limit", Requester.PROGRAM_STOPPED: "something else"}
 """Causes of aborts that a person has not given: if Gainline was stopped, there is nothing to ask the operator."""
 
 
@@ -103,7 +100,6 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
 
 
 def capture(
-    session: Session,
     row: TrialRow,
     trajectory: Trajectory,
     *,
@@ -119,9 +115,8 @@ def capture(
     stays captured too. A flight that was aborted on request counts against its gains only once a person says that the
     vehicle behaved badly. Raises TrajectoryError when the record cannot be stored.
     """
-    stored = trajectories.store_trajectory(session, trajectory)
-    row.trajectory = stored
-    recorded = trajectories.trajectory_of(session, stored.id)
+    row.trajectory = pack(trajectory)
+    recorded = unpack(row.trajectory)
     experiment = experiment_of_campaign(row.campaign)
     judged = score(experiment, recorded)
     glitches = find_glitches(experiment, recorded)
@@ -232,7 +227,7 @@ def _dated(flown: Takeoff) -> tuple[datetime, Takeoff]:
     return at if is_possible else now, replace(flown, trajectory=replace(flown.trajectory, source=source))
 
 
-def _capture_import(session: Session, row: TrialRow, flown: Takeoff, accepted: Accepted) -> None:
+def _capture_import(row: TrialRow, flown: Takeoff, accepted: Accepted) -> None:
     """Capture the record, as an invalid one if it begins at lift-off or is implausible. Unless that is accepted, raises
     UnconfirmedError for such a record, and for one that cannot be scored, or, of a flight flown elsewhere, has gaps."""
     experiment = experiment_of_campaign(row.campaign)
@@ -245,7 +240,7 @@ def _capture_import(session: Session, row: TrialRow, flown: Takeoff, accepted: A
         is_in_si = bool(flown.gain_names)  # an autopilot's log, in which only the datum may be another
         raise unconfirmed(doubts, readings if not is_in_si or readings == (Reading.OTHER_DATUM,) else ())
     ending: Ending = "completed" if not doubts or doubts[0].code == UNSCORABLE else "invalid"
-    capture(session, row, record, ending=ending, reason=reason_of(doubts))
+    capture(row, record, ending=ending, reason=reason_of(doubts))
 
 
 def import_record(
@@ -269,7 +264,7 @@ def import_record(
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         _settle_gains(session, row, flown, confirmed=accepted.confirm)
-        _capture_import(session, row, flown, accepted)
+        _capture_import(row, flown, accepted)
         proposals.history_changed(session, campaign)
         return trial_view(session, row)
     if fleet.can_fly(campaign.vehicle):
@@ -281,7 +276,7 @@ def import_record(
     _settle_gains(session, row, flown, confirmed=accepted.confirm)
     proposals.start_flying(campaign)
     row.flown_at, flown = _dated(flown)
-    _capture_import(session, row, flown, accepted)
+    _capture_import(row, flown, accepted)
     proposals.finish_flying(session, campaign)
     return trial_view(session, row)
 

@@ -26,13 +26,12 @@ from app.web.dependencies import (
     PLANNED_RECORD_BODY,
     REQUEST_BODY,
     CurrentSettings,
-    CursorText,
     Id,
     IdempotentPost,
-    Limit,
     Reader,
     Record,
     RequestContextDep,
+    WantedPart,
     Writer,
     described,
     json_only,
@@ -50,9 +49,9 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 
 
 @router.get("/campaigns/{campaign_id}/trials")
-def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[Trial]:
+def list_trials(session: Reader, campaign_id: Id, part: WantedPart) -> Page[Trial]:
     """The trials of a campaign, in the order of their numbers."""
-    return service.list_trials(session, campaign_id, limit=limit, cursor=cursor)
+    return service.list_trials(session, campaign_id, part)
 
 
 @router.post("/campaigns/{campaign_id}/gate")
@@ -218,6 +217,4 @@ def upload_trajectory(
 def add_photo(upload: Record, trial_id: Id) -> TrialPhoto:
     """Add a photo (JPEG, PNG or WebP, detected by its content; at most 10 MiB) to a flight, as the form field
     `file`."""
-    upload.file.seek(0)
-    content = upload.file.read(photos.MAX_BYTES + 1)
-    return upload.once(lambda session: photos.add_photo(session, trial_id, content))
+    return upload.once(lambda session: photos.add_photo(session, trial_id, upload.content()))
