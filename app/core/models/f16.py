@@ -27,21 +27,11 @@ AIRSPEED_FT_S: Final = 500.0
 LARGEST_ERROR_RAD: Final = 10.0
 """The run ends when the pitch error reaches this size; from there on it counts as this."""
 
-ALTITUDE: Final = 0
-PITCH: Final = 1
-SPEED: Final = 2
-ANGLE_OF_ATTACK: Final = 3
-PITCH_RATE: Final = 4
-STATES: Final = 5
-DISTANCE: Final = 5
-DIVERGED: Final = 6
-MEMORY_SIZE: Final = 7
+ALTITUDE, PITCH, SPEED, ANGLE_OF_ATTACK, PITCH_RATE, STATES = range(6)
+DISTANCE, DIVERGED, MEMORY_SIZE = range(STATES, STATES + 3)
 """Memory of a run: the five states, the distance travelled (ft), and whether the error has reached its limit."""
 
-REFERENCE: Final = 5
-THRUST: Final = 6
-ELEVATOR: Final = 7
-DETAIL: Final = 8
+REFERENCE, THRUST, ELEVATOR, DETAIL = range(STATES, STATES + 4)
 """Columns of a run's detail: the five states, the reference (rad), and the two limited commands."""
 
 TRIM_THRUST_LB: Final = 2120.6214478152
