@@ -140,16 +140,12 @@ def list_parameters(target: Target) -> Outgoing:
 
 
 def read_parameter(target: Target, parameter: str, place: int = -1) -> Outgoing:
+    """Return a request for a parameter, or for the one at a place in the vehicle's list, which must not be past its
+    end, because Paparazzi reads beyond its table."""
     return Outgoing(
         "PARAM_REQUEST_READ",
         {"target_system": target.aircraft, "target_component": 0, "param_id": parameter, "param_index": place},
     )
-
-
-def read_place(target: Target, place: int) -> Outgoing:
-    """Return a request for the parameter at a place in the vehicle's list, which must not be past its end, because
-    Paparazzi reads beyond its table."""
-    return read_parameter(target, "", place)
 
 
 def command(target: Target, code: int, *parameters: float) -> Outgoing:

@@ -2,7 +2,6 @@
 disturbances, aborts.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -24,7 +23,7 @@ from app.core.control.vertical_guidance import (
     THROTTLE,
     fix,
 )
-from app.core.errors import InputError, Problem
+from app.core.errors import Problem
 from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.formatting import percent
 from app.core.models.set_points import SetPoints
@@ -64,19 +63,12 @@ LISTEN_EVERY_S: Final = 0.02
 
 
 class Pacer:
-    """Limit vehicle time to `speed` times the clock's time; None does not limit it.
+    """Limit vehicle time to `speed` times the clock's time, a positive number; None does not limit it.
 
     Time is counted from the start, so that a computation that fell behind catches up.
     """
 
     def __init__(self, speed: float | None, clock: Clock = REAL_TIME) -> None:
-        """Raises InputError unless `speed` is a positive finite number or None."""
-        if speed is not None and not (math.isfinite(speed) and speed > 0.0):
-            raise InputError(
-                "This flight cannot be paced.",
-                problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
-                hint="Use the ratio of simulated to wall-clock time, such as 10; omit it to fly at full speed.",
-            )
         self._speed = speed
         self._clock = clock
         self._start_s = clock.now_s()

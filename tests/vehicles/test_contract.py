@@ -150,14 +150,6 @@ def test_the_pace_does_not_change_the_flight(kind: str, vehicle: Vehicle) -> Non
     assert same(fly(vehicle, speed=100.0).trajectory, fly(vehicle).trajectory)
 
 
-@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan"), float("inf")])
-def test_an_impossible_pace_is_refused_and_the_safe_gains_are_back(kind: str, vehicle: Vehicle, speed: float) -> None:
-    with pytest.raises(InputError) as refusal:
-        fly(vehicle, speed=speed)
-    assert refusal.value.problems[0].field == "speed"
-    assert vehicle.read_gains() == PROFILES[kind].safe
-
-
 def test_a_flight_aborted_before_it_starts_leaves_one_instant(kind: str, vehicle: Vehicle) -> None:
     record = fly(vehicle, should_stop=lambda: StopRequest("changed my mind"))
     assert (record.ending, record.reason, record.has_flown) == ("aborted", "changed my mind", False)

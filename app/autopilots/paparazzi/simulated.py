@@ -24,7 +24,6 @@ from app.autopilots.paparazzi.simulated_plan import (
     FlightPlan,
     Vertical,
     held,
-    setting,
     settings,
 )
 from app.autopilots.paparazzi.simulated_telemetry import (
@@ -55,6 +54,7 @@ from app.autopilots.simulated.body import (
     sender,
     whole_ticks,
 )
+from app.autopilots.simulated.copter_parameters import Kind, Parameter
 from app.core.control.vertical_guidance import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
 
 MODES: Final = (KILL, FAILSAFE, HOME, BY_HAND, NAV, GUIDED)
@@ -66,8 +66,7 @@ HOMING_M_S: Final = 3.0
 RECEIVE_BUFFER: Final = 256
 TRANSACTION_S: Final = 15.3
 _MAVLINK_1: Final = 0xFE
-_REAL32: Final = 9
-_BEHIND: Final = setting("", math.nan)
+_BEHIND: Final = Parameter("", Kind.REAL32, math.nan)
 _ARM_DISARM: Final = 400
 _NAV_WAYPOINT: Final = 16
 _LOCAL_ENU: Final = 4
@@ -261,7 +260,7 @@ class Paparazzi(ReportingPaparazzi):
         fields: Fields = {
             "param_id": known.name,
             "param_value": value,
-            "param_type": _REAL32,
+            "param_type": Kind.REAL32,
             "param_count": count,
             "param_index": place,
         }
@@ -286,7 +285,7 @@ class Paparazzi(ReportingPaparazzi):
         place = self.parameters.place(name)
         if place is None or self.ignores_parameters or math.isnan(value):
             return
-        if number(message, "param_type") != _REAL32:
+        if number(message, "param_type") != Kind.REAL32:
             return
         self._set(place, name, value)
         self.send_parameter(place)

@@ -4,9 +4,11 @@ order, with their values after the start.
 Setting names are the C variables' truncated to 16 characters; a name of 16 characters is never found by a request.
 """
 
+import csv
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Final
 
 from app.autopilots.simulated.copter_parameters import Kind, Parameter, Parameters
@@ -126,11 +128,6 @@ NEWER_KILL_SETTING: Final = "aut_kil_thr"
 """Name in a source tree of 2017 (version 5.10), in which the variables are in one structure."""
 
 
-def setting(name: str, default: int | float) -> Parameter:
-    """A setting; an integer default marks an integer in the autopilot, to which values are truncated."""
-    return Parameter(name, Kind.INT32 if isinstance(default, int) else Kind.REAL32, float(default))
-
-
 def held(kind: Kind, value: float) -> float:
     """Return a value as held in the autopilot's variable."""
     if kind is Kind.REAL32:
@@ -141,85 +138,12 @@ def held(kind: Kind, value: float) -> float:
 def settings(kill_setting: str) -> Parameters:
     """Return the settings with their values after the start; `kill_setting` is this release's name of the one that
     stops the throttle, empty if there is none."""
-    named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
-    return Parameters([each for each in named if each.name], longest_name=NAME_LIMIT - 1)
+    with (Path(__file__).parent / "simulated_settings.csv").open(encoding="ascii", newline="") as file:
+        rows = [(row["name"], row["default"]) for row in csv.DictReader(file)]
+    named = ((kill_setting if name == KILL_SETTING else name, default) for name, default in rows)
+    return Parameters([_setting(*row) for row in named if row[0]], longest_name=NAME_LIMIT - 1)
 
 
-SETTINGS: Final = (
-    setting("tel_mod_Mav", 0),
-    setting("tel_mod_Mai", 0),
-    setting("aut_mod_aut", 13),
-    setting(KILL_SETTING, 1),
-    setting("aut_pow_swi", 0),
-    setting("aut_mod", 13),
-    setting("gui_v_kp", 283),
-    setting("gui_v_kd", 82),
-    setting("gui_v_ki", 13),
-    setting("gui_v_nom_thr", 0.655),
-    setting("gui_v_ada_thr_en", 0),
-    setting("gui_v_z_sp", -23),
-    setting("gui_h_use_ref", 1),
-    setting("gh_ref_max_spe", 5.0),
-    setting("gui_h_app_for_by", 0.0),
-    setting("gh_ref_tau", 0.5),
-    setting("gh_ref_ome", 1.169371),
-    setting("gh_ref_zet", 0.85),
-    setting("gui_h_gai_p", 79),
-    setting("gui_h_gai_d", 100),
-    setting("gui_h_gai_i", 30),
-    setting("gui_h_gai_v", 0),
-    setting("gui_h_gai_a", 0),
-    setting("gui_h_sp_pos_x", 0),
-    setting("gui_h_sp_pos_y", 0),
-    setting("fli_alt", 149.0),
-    setting("nav_hea", 31),
-    setting("nav_rad", 5.0),
-    setting("nav_cli_vsp", 0.5),
-    setting("nav_des_vsp", -0.8),
-    setting("sta_gai_p_x", 850),
-    setting("sta_gai_d_x", 425),
-    setting("sta_gai_i_x", 0),
-    setting("sta_gai_dd_x", 0),
-    setting("sta_gai_p_y", 850),
-    setting("sta_gai_d_y", 425),
-    setting("sta_gai_i_y", 0),
-    setting("sta_gai_dd_y", 0),
-    setting("sta_gai_p_z", 1000),
-    setting("sta_gai_d_z", 700),
-    setting("sta_gai_i_z", 0),
-    setting("sta_gai_dd_z", 100),
-    setting("att_ref_qua_i_mo", 7.853981),
-    setting("att_ref_qua_i_mo", 0.9),
-    setting("att_ref_qua_i_mo", 7.853981),
-    setting("att_ref_qua_i_mo", 0.9),
-    setting("att_ref_qua_i_mo", 3.490659),
-    setting("att_ref_qua_i_mo", 0.9),
-    setting("nps_byp_ahr", 0),
-    setting("nps_byp_ins", 0),
-    setting("gps_has_fix", 1),
-    setting("dat_ena", 1),
-    setting("nps_ele_sup_vol", 12.4),
-    setting("nps_atm_win_spe", 0.0),
-    setting("nps_atm_win_dir", 0.0),
-    setting("nps_atm_tur_sev", 0.0),
-    setting("imu_bod_to_imu_e", 0.0),
-    setting("imu_bod_to_imu_e", 0.0),
-    setting("imu_bod_to_imu_e", 0.0),
-    setting("imu_b2i_set_cur", 0),
-    setting("mul_gps_mod", 0),
-    setting("ahr_icq_gra_heu_", 30),
-    setting("ahr_icq_acc_ome", 0.063),
-    setting("ahr_icq_acc_zet", 0.9),
-    setting("ahr_icq_mag_ome", 0.04),
-    setting("ahr_icq_mag_zet", 0.9),
-    setting("air_dat_qnh", 1013.315),
-    setting("air_dat_tas_fac", 1.0),
-    setting("air_dat_cal_qnh_", 0),
-    setting("air_dat_cal_air", 1),
-    setting("air_dat_cal_tas_", 1),
-    setting("air_dat_cal_ams_", 0),
-    setting("geo_mag_cal_onc", 0),
-    setting("gps_nps_gps_nps_", 1),
-    setting("dat_mav_per_sta", 1),
-    setting("dat_mav_per_tel_", 1),
-)
+def _setting(name: str, default: str) -> Parameter:
+    """A setting; a default without a decimal point marks an integer in the autopilot, to which values are truncated."""
+    return Parameter(name, Kind.REAL32 if "." in default else Kind.INT32, float(default))

@@ -60,9 +60,7 @@ SPEED_BITS: Final = 19
 R33_BITS: Final = 14
 LEVEL: Final = 1 << R33_BITS
 
-THROTTLE: Final = 0
-ALT: Final = 1
-CLIMB: Final = 2
+THROTTLE, ALT, CLIMB = range(3)
 MODES: Final = {"throttle": THROTTLE, "alt": ALT, "climb": CLIMB}
 """`throttle`: target is the thrust; `alt`: altitude up, 8 bits; `climb`: climb rate up, 19 bits."""
 
@@ -89,20 +87,10 @@ POSITION_ERROR_MAX: Final = fix(10.0, POSITION_BITS)
 SPEED_ERROR_MAX: Final = fix(10.0, SPEED_BITS)
 ERROR_SUM_MAX: Final = 2_000_000
 
-# Indices in the state array.
-P: Final = 0
-V: Final = 1
-A: Final = 2
-Z_SUM_ERR: Final = 3
-Z_REF: Final = 4
-ZD_REF: Final = 5
-ZDD_REF: Final = 6
-FF_CMD: Final = 7
-FB_CMD: Final = 8
-LARGEST_PRODUCT: Final = 9
-CHECK_PHASE: Final = 10
-CHECKS_PASSED: Final = 11
-STATE_SIZE: Final = 12
+(
+    P, V, A, Z_SUM_ERR, Z_REF, ZD_REF, ZDD_REF, FF_CMD, FB_CMD, LARGEST_PRODUCT, CHECK_PHASE, CHECKS_PASSED, STATE_SIZE,
+) = range(13)  # fmt: skip
+"""Indices in the state array."""
 
 State = NDArray[np.int64]
 

@@ -27,21 +27,11 @@ AIRSPEED_FT_S: Final = 500.0
 LARGEST_ERROR_RAD: Final = 10.0
 """The run ends when the pitch error reaches this size; from there on it counts as this."""
 
-ALTITUDE: Final = 0
-PITCH: Final = 1
-SPEED: Final = 2
-ANGLE_OF_ATTACK: Final = 3
-PITCH_RATE: Final = 4
-STATES: Final = 5
-DISTANCE: Final = 5
-DIVERGED: Final = 6
-MEMORY_SIZE: Final = 7
+ALTITUDE, PITCH, SPEED, ANGLE_OF_ATTACK, PITCH_RATE, STATES = range(6)
+DISTANCE, DIVERGED, MEMORY_SIZE = range(STATES, STATES + 3)
 """Memory of a run: the five states, the distance travelled (ft), and whether the error has reached its limit."""
 
-REFERENCE: Final = 5
-THRUST: Final = 6
-ELEVATOR: Final = 7
-DETAIL: Final = 8
+REFERENCE, THRUST, ELEVATOR, DETAIL = range(STATES, STATES + 4)
 """Columns of a run's detail: the five states, the reference (rad), and the two limited commands."""
 
 TRIM_THRUST_LB: Final = 2120.6214478152
@@ -107,13 +97,6 @@ def rollout(
             memory[j] = moved[j]
 
 
-@kernel
-def rollouts(gains: Samples, moves: Samples, bias: Samples, errors: Samples, no_detail: Samples) -> None:
-    """Runs from trim: gains (k, 6), transitions (k, 5, 7) or (1, 5, 7), errors out (k, n); `no_detail` (0, 8)."""
-    for run in range(len(gains)):
-        rollout(np.zeros(MEMORY_SIZE), gains[run], moves[run % len(moves)], AMPLITUDE_RAD, bias, errors[run], no_detail)
-
-
 def track(gains: Samples, transition: Samples, samples: int) -> tuple[Samples, Samples]:
     """One run from trim with all channels: pitch error (n,), detail (n, 8)."""
     errors, detail = np.empty(samples), np.empty((samples, DETAIL))
@@ -122,10 +105,12 @@ def track(gains: Samples, transition: Samples, samples: int) -> tuple[Samples, S
 
 
 def track_batch(gains: Samples, moves: Samples, samples: int, bias: Samples | None = None) -> Samples:
-    """Many runs from trim in one compiled call: gains (k, 6), transitions (k or 1, 5, 7) → pitch errors (k, n)."""
+    """Many runs from trim: gains (k, 6), transitions (k or 1, 5, 7) → pitch errors (k, n)."""
     errors = np.empty((len(gains), samples))
     added = np.empty((0, STATES)) if bias is None else np.ascontiguousarray(bias)
-    rollouts(np.ascontiguousarray(gains), moves, added, errors, np.empty((0, DETAIL)))
+    no_detail = np.empty((0, DETAIL))
+    for run, each in enumerate(np.ascontiguousarray(gains)):
+        rollout(np.zeros(MEMORY_SIZE), each, moves[run % len(moves)], AMPLITUDE_RAD, added, errors[run], no_detail)
     return errors
 
 

@@ -57,21 +57,16 @@ GROUND_EFFECT_HEIGHT_M: Final = 0.4
 BATTERY_SAG_S: Final = 33.0
 """Time in which a flight reaches the full sag."""
 
-ALTITUDE: Final = 0
-CLIMB_RATE: Final = 1
+ALTITUDE, CLIMB_RATE = range(2)
 """The first two rows of the channels, columns of the disturbances and entries of a vehicle's state array."""
 
 CHANNELS: Final = ("altitude_m", "climb_rate_m_s", "reference_m", "thrust", "feed_forward", "feedback")
 
-ENTERED: Final = 2
-COLUMNS: Final = 3
+ENTERED, COLUMNS = range(2, 4)
 """Columns of the disturbances: of altitude (m) and climb rate (m/s) in the next step, and whether the loop is
 entered."""
 
-THRUST: Final = 2
-COMMAND: Final = 3
-STEPS_FLOWN: Final = 4
-VEHICLE_SIZE: Final = 5
+THRUST, COMMAND, STEPS_FLOWN, VEHICLE_SIZE = range(2, 6)
 """The other entries of a vehicle's state array: the thrust after the lag (share of full), the last command (counts),
 and the steps since the loop was entered."""
 

@@ -3,8 +3,8 @@
 All runs take a step before the next step begins, so that the inner loops run over the lanes and can be vectorised. Two
 properties make this possible. The loop's reference and feed-forward depend on the set points alone, and come from a
 table. And its integers are stored as doubles, whose arithmetic is exact for them as long as nothing wraps at 32 bits:
-`are_exact` selects the gains with which no product can wrap, and a run whose climb rate becomes too large for 32 bits
-is repeated with `rollout`.
+`are_exact` selects the gains with which no product can wrap, and the climb rate would have to reach 4096 m/s, which no
+model within its bounds does.
 """
 
 from functools import lru_cache
@@ -59,36 +59,16 @@ from app.core.records.trajectory import Samples
 
 BATCH_WIDTH: Final = 16
 """Largest number of simultaneous runs."""
-FASTEST_M_S: Final = 4000.0
-"""Faster climb rates do not fit into the loop's 32 bits (4096 m/s)."""
 PAST: Final = 64
 """Length of the altitude and climb rate buffers, in steps: a power of two."""
 
 _POSITION, _SPEED, _FEED_FORWARD, _CHECK, _GUIDE_SIZE = range(5)
 """Rows of the table shared by all runs: reference position and speed, feed-forward, whether flight is checked."""
 
-_KP: Final = 0 * BATCH_WIDTH
-_KI: Final = 1 * BATCH_WIDTH
-_KD: Final = 2 * BATCH_WIDTH
-_SHARE: Final = 3 * BATCH_WIDTH
-_HOVER_FORCE: Final = 4 * BATCH_WIDTH
-_RESPONSE: Final = 5 * BATCH_WIDTH
-_GROUND: Final = 6 * BATCH_WIDTH
-_SAG: Final = 7 * BATCH_WIDTH
-_LATENCY: Final = 8 * BATCH_WIDTH
-_DRAG: Final = 9 * BATCH_WIDTH
-_PART: Final = 10 * BATCH_WIDTH
-_HEIGHT: Final = 11 * BATCH_WIDTH
-_CLIMB: Final = 12 * BATCH_WIDTH
-_THRUST: Final = 13 * BATCH_WIDTH
-_ERROR_SUM: Final = 14 * BATCH_WIDTH
-_COMMAND: Final = 15 * BATCH_WIDTH
-_IN_FLIGHT: Final = 16 * BATCH_WIDTH
-_HEIGHT_BEFORE: Final = 17 * BATCH_WIDTH
-_CLIMB_BEFORE: Final = 18 * BATCH_WIDTH
-_SENSED: Final = 19 * BATCH_WIDTH
-_FASTEST: Final = 20 * BATCH_WIDTH
-_SIZE: Final = 21 * BATCH_WIDTH
+(
+    _KP, _KI, _KD, _SHARE, _HOVER_FORCE, _RESPONSE, _GROUND, _SAG, _LATENCY, _DRAG, _PART, _HEIGHT, _CLIMB, _THRUST,
+    _ERROR_SUM, _COMMAND, _IN_FLIGHT, _HEIGHT_BEFORE, _CLIMB_BEFORE, _SENSED, _SIZE,
+) = range(0, 21 * BATCH_WIDTH, BATCH_WIDTH)  # fmt: skip
 """Offsets of each quantity in the array of the runs.
 
 One array with fixed offsets lets the compiler see that the quantities of different runs do not overlap. The gains are
@@ -113,26 +93,15 @@ def fly_batch(gains: Counts, models: Samples, set_points: SetPoints, samples: in
     """Many flights in compiled calls: gains (k, 3), models (k, 8) → altitude (k, samples)."""
     altitude = np.empty((len(gains), samples))
     exact = are_exact(gains) & (models[:, MEASUREMENT_DELAY_S] * RATE_HZ < PAST - 2)
-    side_by_side = np.flatnonzero(exact) if len(gains) > 1 else np.zeros(0, dtype=np.int64)
-    alone = np.setdiff1d(np.arange(len(gains)), side_by_side)
-    if side_by_side.size:
-        guide = _guide(set_points, samples)
-        for runs in np.array_split(side_by_side, -(-side_by_side.size // BATCH_WIDTH)):
-            flown, fastest_m_s = _fly(gains[runs], models[runs], set_points.targets, guide)
-            altitude[runs] = flown
-            alone = np.concatenate((alone, runs[~(fastest_m_s < FASTEST_M_S)]))
-    if alone.size:
-        altitude[alone] = fly_each(gains[alone], models[alone], set_points, samples)
+    side_by_side, alone = np.flatnonzero(exact), np.flatnonzero(~exact)
+    guide = _guide(set_points, samples)
+    for first in range(0, len(side_by_side), BATCH_WIDTH):
+        runs = side_by_side[first : first + BATCH_WIDTH]
+        flown = np.empty((len(runs), samples))
+        _fly_lanes(gains[runs], models[runs], set_points.targets, guide, flown)
+        altitude[runs] = flown
+    altitude[alone] = fly_each(gains[alone], models[alone], set_points, samples)
     return altitude
-
-
-def _fly(gains: Counts, models: Samples, targets: Counts, guide: Samples) -> tuple[Samples, Samples]:
-    """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs, padded to a multiple of four."""
-    k = len(gains)
-    filled = np.minimum(np.arange(-(-k // 4) * 4), k - 1)
-    altitude, fastest_m_s = np.empty((k, guide.shape[1])), np.empty(k)
-    _fly_lanes(gains[filled], models[filled], targets, guide, altitude, fastest_m_s)
-    return altitude, fastest_m_s
 
 
 def reference_altitude(set_points: SetPoints, samples: int) -> Samples:
@@ -212,18 +181,15 @@ def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, gui
         height, climb = advance(height, climb, GRAVITY_M_S2 * (lift - 1.0) - runs[_DRAG + lane] * climb)
         runs[_ERROR_SUM + lane], runs[_COMMAND + lane], runs[_THRUST + lane] = total, command, thrust
         runs[_HEIGHT + lane], runs[_CLIMB + lane] = height, climb
-        runs[_FASTEST + lane] = max(runs[_FASTEST + lane], abs(climb))
 
 
 @kernel
-def _fly_lanes(
-    gains: Counts, models: Samples, targets: Counts, guide: Samples, altitude: Samples, fastest_m_s: Samples
-) -> None:
-    """Fly k runs, some of which may be padding: altitude out (j, n), fastest (j,), j ≤ k.
+def _fly_lanes(gains: Counts, models: Samples, targets: Counts, guide: Samples, altitude: Samples) -> None:
+    """Fly up to `BATCH_WIDTH` runs: gains (k, 3), models (k, 8), altitude out (k, n).
 
     Delayed values are written ahead to where they are due, so that all runs read at the same index.
     """
-    lanes, wanted = len(gains), len(altitude)
+    lanes = len(gains)
     runs, whole = np.zeros(_SIZE), np.zeros(BATCH_WIDTH, dtype=np.int64)
     heights, climbs = np.zeros(PAST * BATCH_WIDTH), np.zeros(PAST * BATCH_WIDTH)
     states = np.zeros((BATCH_WIDTH, STATE_SIZE), dtype=np.int64)
@@ -237,9 +203,8 @@ def _fly_lanes(
                 states[lane, CHECK_PHASE] = RATE_HZ
                 runs[_IN_FLIGHT + lane] = 1.0 if detect_flight(states[lane], int(runs[_COMMAND + lane])) else 0.0
         _take_step(runs, lanes, heights, climbs, guide, i)
-        for lane in range(wanted):
+        for lane in range(lanes):
             altitude[lane, i] = runs[_SENSED + lane]
-    for lane in range(wanted):
-        fastest_m_s[lane] = runs[_FASTEST + lane]
+    for lane in range(lanes):
         if runs[_LATENCY + lane] > 0.0:
             delay_start(altitude[lane], targets, runs[_LATENCY + lane])

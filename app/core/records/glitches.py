@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.records.flight_events import AIRBORNE_M
-from app.core.records.metrics import MAX_GAP_S, MAX_STORED_GAP_S
+from app.core.records.metrics import MAX_GAP_S, MAX_STORED_GAP_S, find_problem
 from app.core.records.trajectory import Samples, Trajectory
 
 
@@ -67,7 +67,7 @@ def find_glitches(experiment: ScoredOutput, trajectory: Trajectory) -> tuple[Gli
 
     A record without the scored output, or whose times do not increase, has none: scoring reports what is wrong with it.
     """
-    if experiment.output not in trajectory.channels or not _sound(trajectory, experiment.output):
+    if find_problem(trajectory, experiment.output) is not None:
         return ()
     scored = (trajectory.time_s >= 0.0) & (trajectory.time_s <= experiment.grid_s[-1] + MAX_GAP_S)
     if np.count_nonzero(scored) < 3:
@@ -104,15 +104,6 @@ def repaired(experiment: ScoredOutput, trajectory: Trajectory, glitches: tuple[G
         if bad.any() and good.any():
             values[bad] = np.interp(time_s[bad], time_s[good], values[good])
     return replace(trajectory, channels={**trajectory.channels, experiment.output: values})
-
-
-def _sound(trajectory: Trajectory, output: str) -> bool:
-    time_s, values = trajectory.time_s, trajectory[output]
-    return (
-        len(values) == len(time_s)
-        and bool(np.isfinite(values).all() and np.isfinite(time_s).all())
-        and bool((np.diff(time_s) > 0.0).all())
-    )
 
 
 def _gap(time_s: Samples, first: int, last: int) -> Glitch:

@@ -72,7 +72,7 @@ def require_scorable(
     The channel must exist and be finite, time stamps must increase, and samples must be at most 0.25 s apart anywhere
     in the window, ends included; `accept_gaps` allows gaps inside the record.
     """
-    problem = _problem(trajectory, channel) or _uncovered(trajectory.time_s, start_s, stop_s)
+    problem = find_problem(trajectory, channel) or _uncovered(trajectory.time_s, start_s, stop_s)
     if problem is None and not accept_gaps:
         problem = _gap(trajectory.time_s, start_s, stop_s)
     if problem is not None:
@@ -83,7 +83,8 @@ def require_scorable(
         )
 
 
-def _problem(trajectory: Trajectory, channel: str) -> Problem | None:
+def find_problem(trajectory: Trajectory, channel: str) -> Problem | None:
+    """What is wrong with a recorded channel, or with the times of its samples."""
     time_s = trajectory.time_s
     if channel not in trajectory.channels:
         return Problem(channel, f"is not among the recorded channels ({', '.join(trajectory.channels)})")

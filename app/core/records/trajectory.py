@@ -5,7 +5,7 @@ they bend (Ramer, 1972; Douglas and Peucker, 1973).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -74,12 +74,8 @@ class Trajectory:
 
     def as_stored(self) -> "Trajectory":
         """The trajectory as the database returns it: every number rounded to single precision."""
-        return Trajectory(
-            _single(self.time_s),
-            {name: _single(values) for name, values in self.channels.items()},
-            self.source,
-            self.clock,
-        )
+        channels = {name: _single(values) for name, values in self.channels.items()}
+        return replace(self, time_s=_single(self.time_s), channels=channels)
 
 
 def _single(values: Samples) -> Samples:

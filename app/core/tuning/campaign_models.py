@@ -197,9 +197,6 @@ class StepsModel(VerticalModel[AltitudeSteps], LimitedModel[Vector]):
         along = [space.mapping(box.low + share * (box.high - box.low)) for share in _STARTS]
         return self.found(GainSpace(bounds=bounds, gentle=space.mapping(space.default), zeros=_ZEROS), along)
 
-    def notes(self, gains: Vector) -> tuple[str, ...]:
-        return self.limits(gains)
-
 
 CampaignModel = TakeoffModel | StepsModel | CopterModel
 """A model of one vehicle, fitted to a campaign's flights, as the strategy `calibrated` takes it."""

@@ -109,7 +109,7 @@ class LimitedModel(ABC, Generic[_V]):
         )
         return None if gains is None else whole(gains)
 
-    def limits(self, gains: Vector) -> tuple[str, str]:
+    def notes(self, gains: Vector) -> tuple[str, ...]:
         """Sentences about throttle activity and margin."""
         loop = self.loop(gains)
         activity = self.flown(gains)[1] / self.flown(self.first_gains)[1]
@@ -234,7 +234,7 @@ class CopterModel(LimitedModel[Copter]):
         hover = () if self._hover is None else (self._hover.reason,)
         as_good_m = _interval(self._all.predict(self.loop(gains))).upper
         found = [self._rule_note(*rule, as_good_m=as_good_m) for rule in self._rules]
-        return (*hover, *self.limits(gains), f"For comparison, the model predicts {'; '.join(found)}.")
+        return (*hover, *super().notes(gains), f"For comparison, the model predicts {'; '.join(found)}.")
 
     def _rule_note(self, name: str, error_m: float, margin: float, *, as_good_m: float) -> str:
         remark = ", which is predicted as good" if error_m <= as_good_m else ""

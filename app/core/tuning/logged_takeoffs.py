@@ -62,8 +62,8 @@ class TakeoffAnalysis:
 
     `numbers` are the takeoffs used, all scored over `window_s`; `best` is the one with the lowest error, and `response`
     how it followed the step to 3 m. `fitted` is the vehicle, and `residual_m` the rms of the altitude that it does not
-    explain. `assessments` begins with the gains of `best`; `proposed` is None if none are better, which `insufficient`
-    then says. `predicted` is a takeoff with the proposed gains, else with those of `best`.
+    explain. `assessments` begins with the gains of `best`; `proposed` is None if none are better.
+    `predicted` is a takeoff with the proposed gains, else with those of `best`.
     """
 
     window_s: float
@@ -74,14 +74,13 @@ class TakeoffAnalysis:
     residual_m: float
     assessments: Sequence[AssessedGains]
     proposed: AssessedGains | None
-    insufficient: str | None
     predicted: Trajectory
 
     @property
     def answer(self) -> str:
         """The answer in a sentence or two."""
         if self.proposed is None:
-            return self.insufficient or ""
+            return _KEEP
         error_m, interval = self.proposed.predicted_error_m, self.proposed.interval
         refused = " The gate refuses the gains flown." if self.assessments[0].refusal else ""
         return (
@@ -141,7 +140,6 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
         residual_m=residual_m,
         assessments=(*flown, *stock),
         proposed=proposed if is_better else None,
-        insufficient=None if is_better else _KEEP,
         predicted=predict_flight(calibration, best, experiment.space.vector(shown.gains)).trajectory,
     )
 

@@ -5,7 +5,7 @@ messages apart in time confirm it and none between them contradicts.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import (
@@ -27,7 +27,6 @@ from app.vehicles.mavlink.monitors.ground import AGREED_S, STANDS_S, ClimbMonito
 from app.vehicles.mavlink.monitors.limits import BatteryMonitor, EnvelopeMonitor, LinkMonitor
 from app.vehicles.mavlink.monitors.modes import IdentityMonitor, ModeMonitor
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
 
 _DRIFT_M_S: Final = 0.5
 """Greatest rate of a drift of the altitude on the ground; 0.36 m/s were recorded under PX4."""

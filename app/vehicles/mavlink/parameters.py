@@ -96,7 +96,7 @@ def _list(radio: AutopilotLink) -> dict[int, Parameter]:
 
 def _fetched(radio: AutopilotLink, place: int) -> dict[int, Parameter]:
     answer = radio.request(
-        commands.read_place(radio.target, place), lambda it: isinstance(it, Parameter) and it.place == place
+        commands.read_parameter(radio.target, "", place), lambda it: isinstance(it, Parameter) and it.place == place
     )
     return {place: answer} if isinstance(answer, Parameter) else {}
 

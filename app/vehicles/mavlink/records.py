@@ -127,7 +127,7 @@ def _on_the_second_s_times(trajectory: Trajectory, second_s: Samples, second_m: 
         for name, values in trajectory.channels.items()
     }
     channels = {**own, "altitude_m": second_m[inside], "altitude_2_m": own["altitude_m"]}
-    return Trajectory(time_s, channels, trajectory.source, trajectory.clock)
+    return replace(trajectory, time_s=time_s, channels=channels)
 
 
 SOURCE: Final = "mavlink"

@@ -4,8 +4,8 @@ is at rest before the first, and when each took effect.
 Times are by the vehicle's clock, which is known from its positions and their latency, up to the least latency itself.
 """
 
-import dataclasses
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -19,7 +19,6 @@ from app.vehicles.mavlink.events import ActionDone, PerformAction
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.monitors.commanded import SetPointChange
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import Step, Trial
 
 HELD_BEFORE_S: Final = 6.0
@@ -116,7 +115,7 @@ def command_next(trial: Trial) -> Step:
         return replace(trial, set_points=commanded), (PerformAction(Action.HOLD, set_point_m),)
     trial = replace(
         trial,
-        plan=dataclasses.replace(trial.plan, set_point_m=set_point_m),
+        plan=replace(trial.plan, set_point_m=set_point_m),
         watch=trial.watch.change_set_point(set_point_m),
         set_points=commanded,
     )

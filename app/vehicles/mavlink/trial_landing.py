@@ -1,5 +1,6 @@
 """What a trial does from the command to land on: descend, stop the motors, restore the safe gains."""
 
+from dataclasses import replace
 from typing import Final
 
 from app.autopilots.commands import Action
@@ -13,7 +14,6 @@ from app.vehicles.mavlink.events import (
     confirms_motors_off,
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, DRIFT_M, REPEAT_S, Failure, land_every_s
-from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_reactions import (
     abort,
     abort_landing,

@@ -3,7 +3,7 @@
 It depends on no autopilot and no clock: events carry their time, and commands are data that `trial.py` carries out.
 """
 
-import dataclasses
+from dataclasses import replace
 from typing import Final
 
 from app.autopilots.commands import Action
@@ -24,7 +24,6 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import DRIFT_M, REPEAT_S, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_phases import HANDLERS
 from app.vehicles.mavlink.trial_reactions import allowed_modes, fail, measure_ground, note, note_cause, stop_motors
 from app.vehicles.mavlink.trial_state import COMMANDED, STATES_WITH_TRIAL_GAINS, State, Step, Trial
@@ -54,7 +53,7 @@ def advance(trial: Trial, event: Event) -> Step:
     if isinstance(event, PacketReceived):
         trial, kept = _process_packet(trial, event)
     elif isinstance(event, SecondaryAltitudeReceived):
-        sample = dataclasses.replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
+        sample = replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
         trial = replace(trial, watch=trial.watch.update_secondary(sample))
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=trial.watch.note_duplicate(event.why))

@@ -1,6 +1,7 @@
 """What a trial does in each of its states, as a pure function of the trial and an event."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Final
 
 from app.autopilots.commands import Action
@@ -17,7 +18,6 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DRIFT_M, Failure, Finding
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_landing import disarming, has_rested, landing, link_lost, resting, restoring
 from app.vehicles.mavlink.trial_reactions import (
     MODE_KNOWN_S,

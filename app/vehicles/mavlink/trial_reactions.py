@@ -4,6 +4,7 @@ with their commands, as pure functions of a trial and the time. `trial_phases` d
 
 import statistics
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
@@ -12,7 +13,6 @@ from app.autopilots.measurements import Parameter
 from app.vehicles.flight_end import Landing, StopRequest, request_text
 from app.vehicles.mavlink.events import Event, PacketReceived, PerformAction, SendGain
 from app.vehicles.mavlink.failures import GROUND_M, RESPONSES, Failure, Finding, Reaction
-from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import (
     STATES_WITH_TRIAL_GAINS,
     TRANSITIONS,

@@ -9,7 +9,6 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical import (
     BATTERY_SAG,
-    HOVER_THROTTLE,
     MEASUREMENT_DELAY_S,
     START_LATENCY_S,
     Counts,
@@ -53,14 +52,6 @@ def test_gains_whose_products_wrap_fly_as_the_autopilot_wraps_them() -> None:
     gains[1] = (1600, 1023, 3000)
     assert are_exact(gains).tolist() == [True, False, True]
     assert np.array_equal(fly_batch(gains, each, SET_POINTS, SAMPLES), one_by_one(gains, each))
-
-
-def test_a_vehicle_too_fast_for_the_loops_integers_is_flown_again_alone() -> None:
-    gains, each = gain_sets(2), models(2)
-    each[0, HOVER_THROTTLE] = 1e-4
-    curves = fly_batch(gains, each, SET_POINTS, SAMPLES)
-    assert curves[0].max() > 1000.0
-    assert np.array_equal(curves, one_by_one(gains, each))
 
 
 def test_a_measurement_delay_beyond_what_lanes_remember_is_flown_alone() -> None:

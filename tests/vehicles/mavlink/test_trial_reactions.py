@@ -1,10 +1,4 @@
-from typing import Any
-
-import pytest
-
-from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_state import COMMANDED, OVER, TRANSITIONS, State
-from tests.vehicles.mavlink.walking import TrialDriver
 
 
 def reachable(start: State) -> set[State]:
@@ -41,11 +35,3 @@ def test_quarantine_can_be_reached_from_every_state_that_moves_the_vehicle() -> 
     for state in COMMANDED | {State.LINK_LOST, State.DISARM, State.RESTORE}:
         assert State.QUARANTINE in TRANSITIONS[state]
     assert frozenset({State.IDLE, State.QUARANTINE}) == OVER
-
-
-def test_a_successor_has_the_fields_of_its_trial_and_no_others() -> None:
-    trial = TrialDriver().trial
-    misspelt: dict[str, Any] = {"wy": "it drifts"}
-    assert replace(trial, remarks=("it drifts",)).why == "it drifts"
-    with pytest.raises(TypeError, match="Trial has no wy"):
-        replace(trial, **misspelt)

@@ -5,16 +5,15 @@ A position that cannot follow from the previous one is doubted until more of the
 previous kind.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import DRIFT_M, GROUND_M, Failure, Finding
-from app.vehicles.mavlink.monitors.clock import ATTENDED_S, FRESH_S, LOST_S, STUCK_S
+from app.vehicles.mavlink.monitors.clock import ATTENDED_S, FRESH_S, LOST_S, STUCK_S, since
 from app.vehicles.mavlink.monitors.limits import SILENT_S
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace, since
 
 RESTING_M_S: Final = 0.1
 _JUMP_M: Final = 0.3

@@ -4,14 +4,12 @@ Packets may be late, repeated, in any order, or corrupted: a single one by anoth
 that goes on by itself is the sign of a restart.
 """
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace, since
 
 AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
@@ -40,11 +38,18 @@ _LONGEST_STEP_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
 
 
+def since(before_s: float | None, now_s: float, *, holds: bool) -> float | None:
+    """Return since when something `holds` that has held since `before_s`; None if it does not hold."""
+    if not holds:
+        return None
+    return now_s if before_s is None else before_s
+
+
 def unwrapped(position: Position, newest: Position | None) -> Position:
     """Return the position with a time that continues that of the newest one beyond WRAP_S."""
     near_wrap = newest is not None and newest.time_boot_s > WRAP_S - _NEAR_WRAP_S
     is_wrapped = near_wrap and position.time_boot_s < _NEAR_WRAP_S
-    return dataclasses.replace(position, time_boot_s=position.time_boot_s + WRAP_S) if is_wrapped else position
+    return replace(position, time_boot_s=position.time_boot_s + WRAP_S) if is_wrapped else position
 
 
 def may_have_begun(time_boot_s: float, passed_s: float) -> bool:

@@ -2,13 +2,12 @@
 takeoff's."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import Heartbeat, Measurement, Parameter, Position, TargetAltitude
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
 
 _SAME_M: Final = 0.05
 _ASTRAY_S: Final = 0.3

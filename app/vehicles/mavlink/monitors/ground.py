@@ -1,15 +1,14 @@
 """The ground: since when every source shows the vehicle there, what it reports of its landing, and how high it has
 climbed, by its altitude and by its climb rate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding
 from app.vehicles.mavlink.monitors.altitude import RESTING_M_S
-from app.vehicles.mavlink.monitors.clock import FRESH_S
+from app.vehicles.mavlink.monitors.clock import FRESH_S, since
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace, since
 
 AGREED_S: Final = 1.0
 """Time for which every source must show the vehicle on the ground before its motors may be stopped."""

@@ -1,14 +1,14 @@
 """Limits of a flight: the link, altitude, speed, place, oscillation and lean, the vehicle's own fence, its battery."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding
+from app.vehicles.mavlink.monitors.clock import since
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace, since
 
 SILENT_S: Final = 1.0
 _CLIMB_RATE_M_S: Final = 4.0

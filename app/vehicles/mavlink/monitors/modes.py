@@ -1,14 +1,13 @@
 """Who flies the vehicle and how, by its heartbeats and the blocks of its flight plan, and whether it is still the same
 one: whether two vehicles answer, or it has rebooted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.autopilots.measurements import Heartbeat, Position
 from app.vehicles.base import ALTITUDE_LIMIT_M
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.plan import Plan
-from app.vehicles.mavlink.states import replace
 
 _IN_TURN: Final = 0.8
 """Minimum interval of one vehicle's heartbeats, in periods; closer ones are of two vehicles."""
