@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from itertools import count as numbers_from
+from itertools import islice
 from typing import Final, Self
 
 import numpy as np
@@ -45,10 +47,25 @@ class Envelope:
 
 
 def halton(dimensions: int, count: int) -> NDArray[np.float64]:
-    """The first points of the Halton sequence in the unit cube, shape (count, dimensions)."""
-    from scipy.stats.qmc import Halton
+    """The first points of the Halton sequence in the unit cube, shape (count, dimensions).
 
-    return np.asarray(Halton(dimensions, scramble=False).random(count))
+    Coordinate d of point i is the radical inverse of i in base p, the d-th prime: its digits reversed behind the point
+    (Halton, 1960). The same numbers as `scipy.stats.qmc.Halton(dimensions, scramble=False)`, a package that takes
+    longer to import than a proposal takes to compute.
+    """
+    points = np.zeros((count, dimensions))
+    for dimension, base in enumerate(_primes(dimensions)):
+        remaining, digit_value = np.arange(count), 1.0 / base
+        while remaining.any():
+            remaining, digit = np.divmod(remaining, base)
+            points[:, dimension] += digit * digit_value
+            digit_value /= base
+    return points
+
+
+def _primes(count: int) -> list[int]:
+    """The first prime numbers."""
+    return list(islice((n for n in numbers_from(2) if all(n % divisor for divisor in range(2, n))), count))
 
 
 WIDEST_SD: Final = 2.0
