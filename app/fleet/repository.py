@@ -76,7 +76,7 @@ def acts_of(vehicle_id: int) -> Select[VehicleActRow]:
 
 
 def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
-    """The lines of the ledger, each with its purpose `why` and an `id`, half of which is that of its flight or act; and
+    """The lines of the ledger, each with its `purpose` and an `id`, half of which is that of its flight or act; and
     their order, newest first.
 
     A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
@@ -85,7 +85,9 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
     flight = FlightRow.vehicle_id == vehicle_id
     lines = union_all(
         select(
-            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("id"), literal("flight", String).label("why")
+            FlightRow.requested_at.label("at"),
+            (2 * FlightRow.id).label("id"),
+            literal("flight", String).label("purpose"),
         ).where(flight),
         select(
             func.coalesce(FlightRow.restored_at, FlightRow.finished_at),
@@ -99,7 +101,7 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
             or_(VehicleActRow.asked.is_not(null()), VehicleActRow.read_back.is_not(null())),
         ),
     ).subquery()
-    return select(Bundle("line", lines.c.id, lines.c.why)), Order("-at", lines.c.at, descending=True)
+    return select(Bundle("line", lines.c.id, lines.c.purpose)), Order("-at", lines.c.at, descending=True)
 
 
 def _is_left_with_its_gains() -> ColumnElement[bool]:
