@@ -28,6 +28,7 @@ from app.autopilots.segments import (
     choose_parts,
     find_landings,
     has_neighbour,
+    in_flight,
     jumps,
     thinned,
     within_limits,
@@ -45,9 +46,6 @@ HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
 """ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
-_ABOVE_GROUND_M: Final = 1.0
-_TELLING: Final = (EventKind.BOOT, EventKind.MOTORS_ON, EventKind.LIFT_OFF, EventKind.LANDING, EventKind.MOTORS_OFF)
-"""Events after which it is known whether the vehicle is in the air, or not any more."""
 _JUMP_M: Final = 0.1
 _JUMP_M_S: Final = 1.0
 _LARGEST_ACCELERATION_M_S2: Final = 50.0
@@ -88,7 +86,7 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
     given, chosen = choose_parts(
         time_s,
         (
-            Condition(_in_flight(recording, time_s), ReasonCode.NEVER_FLEW, "EV"),
+            Condition(_in_flight(recording), ReasonCode.NEVER_FLEW, "EV"),
             Condition(_holds_altitude(recording, time_s), ReasonCode.ALTITUDE_NOT_HELD, "MODE"),
             Condition(~_landings(recording, time_s), ReasonCode.ONLY_TAKEOFFS_OR_LANDINGS, "EV"),
             Condition(is_calm, ReasonCode.VIBRATION_FAILSAFE, "ERR"),
@@ -159,23 +157,11 @@ def _is_reset(rows: Segment) -> Rows:
     )
 
 
-def _in_flight(recording: Recording, time_s: Samples) -> Rows:
-    """Rows between takeoff and landing, by the vehicle's own events. Where none tells whether it flew, as in a log that
-    begins in the air, those well above the lowest altitude, which is 0 or less, and with thrust."""
-    altitude_m, thrust = recording.columns["altitude_m"].values, recording.at("thrust", time_s)
-    lowest_m = np.min(altitude_m[np.isfinite(altitude_m)], initial=0.0)
-    is_up = (altitude_m > lowest_m + _ABOVE_GROUND_M) & (thrust > 0.0)
-    flying, unknown_from_s = is_up, -np.inf
-    for event in recording.events_of(*_TELLING):
-        if event.kind in (EventKind.MOTORS_ON, EventKind.LIFT_OFF):
-            flying = flying & (time_s < unknown_from_s)
-        if event.kind is EventKind.LIFT_OFF:
-            flying = flying | (time_s >= event.time_s + _AFTER_TAKEOFF_S)
-        else:
-            flying = flying & (time_s < event.time_s - _BEFORE_LANDING_S)
-        unknown_from_s = event.time_s if event.kind is EventKind.BOOT else np.inf
-        flying = flying | (is_up & (time_s >= unknown_from_s))
-    return flying
+def _in_flight(recording: Recording) -> Rows:
+    """Rows between takeoff and landing, and not near them."""
+    altitude = recording.columns["altitude_m"]
+    thrust = recording.at("thrust", altitude.time_s)
+    return in_flight(recording, altitude.values, thrust, after_s=_AFTER_TAKEOFF_S, before_s=_BEFORE_LANDING_S)
 
 
 def _holds_altitude(recording: Recording, time_s: Samples) -> Rows:
