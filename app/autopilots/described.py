@@ -1,13 +1,11 @@
 """What any recording gives for the description of its flight, and the loop with the parameters that it flew with."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.experiments import ardupilot_loop
-from app.autopilots.ardupilot.logged_flight import HOLDS_ALTITUDE, has_newer_names
+from app.autopilots.ardupilot.logged_flight import HOLDS_ALTITUDE, ardupilot_loop_of
 from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.px4.experiments import px4_loop
 from app.autopilots.px4.logged_flight import LEFT_OUT_MODES
@@ -71,7 +69,7 @@ def loop_of(recording: Recording, at_s: float) -> AltitudeLoop | None:
 
 
 _LOOPS: Final[Mapping[str, Callable[[Recording, Mapping[str, float]], AltitudeLoop]]] = {
-    "ardupilot": lambda recording, given: replace(ardupilot_loop(given), has_newer_names=has_newer_names(recording)),
+    "ardupilot": ardupilot_loop_of,
     "px4": lambda _, given: px4_loop(given),
 }
 

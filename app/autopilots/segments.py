@@ -23,7 +23,6 @@ _DESCENT_M_S: Final = 0.1
 _DESCENT_S: Final = 1.0
 _UNSEEN_S: Final = 2.0
 """A touchdown that much later than the last row before it was not recorded."""
-_BEYOND_LIMIT: Final = 1e-3
 _ABOVE_GROUND_M: Final = 0.5
 _TELLING: Final = (EventKind.BOOT, EventKind.MOTORS_ON, EventKind.LIFT_OFF, EventKind.LANDING, EventKind.MOTORS_OFF)
 """Events after which it is known whether the vehicle is in the air, or not any more."""
@@ -49,10 +48,10 @@ _HELD: Final = frozenset(
 """What these conditions leave is flown with the altitude held."""
 
 
-def within_limits(throttle: Samples) -> Samples:
-    """Shares of full throttle, shape (n,), of which those hardly below 0 or above 1 are these; NaN for what is not a
-    throttle."""
-    near = (throttle >= -_BEYOND_LIMIT) & (throttle <= 1.0 + _BEYOND_LIMIT)
+def within_limits(throttle: Samples, beyond: float = 1e-3) -> Samples:
+    """Shares of full throttle, shape (n,), of which those less than `beyond` below 0 or above 1 are these; NaN for what
+    is not a throttle."""
+    near = (throttle >= -beyond) & (throttle <= 1.0 + beyond)
     return np.where(near, np.clip(throttle, 0.0, 1.0), np.nan)
 
 
