@@ -291,11 +291,8 @@ class _Reader:
         """By the names of the vehicle's release."""
         known = {*given, self.autopilot.learned, *_IN_TAKEOFFS, *_MAY_LACK}
         absent = [each for each in self.autopilot.kept if each not in known]
-        return (
-            tuple(in_newer_names(dict.fromkeys(absent, 0.0)))
-            if ardupilot_flight.has_newer_names(self.recording)
-            else tuple(absent)
-        )
+        own = ardupilot.names_of({each.name for each in self.recording.settings})
+        return tuple(in_newer_names(dict.fromkeys(absent, 0.0), own))
 
     @property
     def _mode(self) -> str:

@@ -175,7 +175,7 @@ def test_a_biased_climb_rate_is_predicted_with_the_deviation_that_it_causes(bias
     content = RELEASES["3.4"].log(older_steps(bias_m_s=bias_m_s))
     flight = read(content)
     assert flight.error_m > 0.6 * abs(bias_m_s) / OLDER["PSC_POSZ_P"]
-    assert vehicle_of(flight)["hover_throttle"] == pytest.approx(TRUTH["hover_throttle"], rel=0.02)
+    assert vehicle_of(flight)["hover_throttle"] == pytest.approx(TRUTH["hover_throttle"], rel=0.01)
     described = answered(RELEASES["3.3"].log(older_steps(bias_m_s=bias_m_s))).tuning.description
     assert described is not None
     assert described.hover_throttle == pytest.approx(TRUTH["hover_throttle"], rel=0.01)

@@ -12,7 +12,6 @@ from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop
 from app.autopilots.ardupilot.log import BESIDE, LOOP, LOOPS, TUNING, history
 from app.autopilots.ardupilot.replica.parameters import (
     LOOP_NAMES,
-    NEWER_NAMES,
     in_newer_names,
     in_older_names,
     names_of,
@@ -126,16 +125,20 @@ def ardupilot_loop_of(recording: Recording, given: Mapping[str, float]) -> ArduP
     is_tuning = "altitude_m" in recording.columns and recording.columns["altitude_m"].source.startswith("CTUN.")
     differentiates = is_tuning and _SINCE_4_1 not in given
     loop = ardupilot_loop({**given, **(_CONSTANTS_UNTIL_4_0 if differentiates else {})})
-    return replace(loop, names=names_of(each.name for each in recording.settings), differentiates=differentiates)
+    return replace(loop, names=names_of({each.name for each in recording.settings}), differentiates=differentiates)
 
 
 class _TuningSegment(Segment):
     """A segment of CTUN, which has no desired climb rate: what of its target does not come from the deviation. With
-    some releases and modes the altitude of the reference changes without one."""
+    some releases and modes the altitude of the reference changes without one, and the climb rate has a bias."""
 
     @property
     def moves_m_s(self) -> Samples:
         return np.gradient(self.z_d_m, self.time_s)
+
+    @property
+    def rises_m_s(self) -> Samples:
+        return self.v_m_s - np.mean(self.v_m_s - np.gradient(self.z_m, self.time_s))
 
     @classmethod
     def of(cls, rows: Segment, loop: ArduPilotLoop) -> "_TuningSegment":
@@ -144,11 +147,6 @@ class _TuningSegment(Segment):
         v_d_m_s = rows.v_t_m_s - from_deviation
         derived = {"v_d_m_s": v_d_m_s, "a_d_m_s2": np.gradient(v_d_m_s, rows.time_s)}
         return cls(**{each.name: getattr(rows, each.name) for each in fields(rows)} | derived)
-
-
-def has_newer_names(recording: Recording) -> bool:
-    """Whether the vehicle's parameters have the names of release 4.7."""
-    return any(each.name in NEWER_NAMES for each in recording.settings)
 
 
 def _rows(recording: Recording, lean: Samples, throttle: Sequence[Samples]) -> Segment:

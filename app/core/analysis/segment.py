@@ -43,6 +43,11 @@ class Segment:
         return self.v_d_m_s
 
     @property
+    def rises_m_s(self) -> Samples:
+        """How fast the vehicle climbs, shape (n,), whatever bias its estimate has."""
+        return self.v_m_s
+
+    @property
     def duration_s(self) -> float:
         """Time from the first row to the last."""
         return float(self.time_s[-1] - self.time_s[0])

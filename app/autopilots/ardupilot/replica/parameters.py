@@ -1,7 +1,7 @@
 """Parameters of ArduCopter's vertical loop, with the firmware's names."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -134,11 +134,12 @@ def in_older_names(name: str, value: float) -> tuple[str, float]:
     return older, _scaled(value, factor)
 
 
-def names_of(own: Iterable[str]) -> dict[str, tuple[str, float]]:
+def names_of(own: Collection[str]) -> dict[str, tuple[str, float]]:
     """Names of releases 4.0 to 4.6 for which a vehicle whose parameters have its `own` names has another one, with
-    that and the factor to its value."""
+    that and the factor to its value: those of 4.7 for all, if it has any of them."""
     renamed = ((_OTHER_NAMES[each], each) for each in own if each in _OTHER_NAMES)
-    return {name: (each, 1.0 / factor) for (name, factor), each in renamed}
+    since_4_7 = SINCE_4_7 if NEWER_NAMES.keys() & own else {}
+    return {**since_4_7, **{name: (each, 1.0 / factor) for (name, factor), each in renamed}}
 
 
 def in_newer_names(values: Mapping[str, float], names: Mapping[str, tuple[str, float]] = SINCE_4_7) -> dict[str, float]:

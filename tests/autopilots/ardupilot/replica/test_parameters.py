@@ -62,7 +62,7 @@ def test_gains_are_written_by_the_names_that_the_vehicle_has() -> None:
     gains = {"PSC_POSZ_P": 3.0, "PSC_ACCZ_P": 0.854}
     assert in_newer_names(gains, names_of(["POS_Z_P", "ACCEL_Z_P", "FRAME"])) == {"POS_Z_P": 3.0, "ACCEL_Z_P": 0.854}
     assert in_newer_names(gains, names_of(["PSC_POSZ_P", "PSC_ACCZ_P", "PSC_ACCZ_FILT"])) == gains
-    assert in_newer_names(gains, names_of(["PSC_D_POS_P", "PSC_D_ACC_P"])) == in_newer_names(gains)
+    assert in_newer_names(gains, names_of(["PSC_D_POS_P"])) == in_newer_names(gains)
 
 
 def test_gains_are_written_by_the_names_and_in_the_units_of_release_4_7() -> None:
