@@ -99,6 +99,16 @@ def test_every_mode_that_holds_altitude_counts_and_landing_does_not() -> None:
     assert spans_s(read(log)) == [(10.0, 21.9)]
 
 
+@pytest.mark.parametrize(("mode", "holds"), [(13, True), (21, True), (24, True), (1, False), (8, False), (11, False)])
+def test_rarer_modes_hold_altitude_or_not(mode: int, holds: bool) -> None:
+    """SPORT, SMART_RTL, ZIGZAG; ACRO, POSITION, DRIFT."""
+    log = ardupilot_log(gusty(), modes=((0.0, mode),))
+    if holds:
+        assert spans_s(read(log)) == [(10.0, 26.9)]
+    else:
+        assert refusal(log) == ("MODE", "altitude_not_held")
+
+
 def test_the_seconds_around_takeoff_and_landing_are_left_out() -> None:
     log = ardupilot_log(gusty(), events=((11.0, NOT_LANDED), (20.5, LANDED)))
     assert spans_s(read(log)) == [(13.0, 17.4)]

@@ -174,8 +174,8 @@ def _values(source: Source, tables: Mapping[str, Table]) -> Samples:
 
 def _in_si(source: Source, factors: Mapping[str, Mapping[str, float]]) -> Source:
     """The source of values in SI, by the factor that the log tells, or else by that of the releases that do not."""
-    told = factors.get(source.message, {}).get(source.field)
-    return source if told is None else replace(source, factor=np.copysign(told, source.factor))
+    given = factors.get(source.message, {}).get(source.field)
+    return source if given is None else replace(source, factor=np.copysign(given, source.factor))
 
 
 def _until_restart(column: Column, boots_s: Sequence[float]) -> Column:
