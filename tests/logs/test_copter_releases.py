@@ -225,6 +225,10 @@ def without(message: str, release: Release = RELEASES["3.6"], **parameters: floa
         (without("CTUN", LOG_BITMASK=1 << 4 | 2), [("CTUN", "message_missing")]),
         (without("CTUN", RELEASES["4.0"], LOG_BITMASK=2), [("CTUN", "log_bit_unset")]),
         (without("MODE"), [("MODE", "message_missing")]),
+        (
+            RELEASES["3.6"].log(older_steps(), parameters={"WPNAV_ACCEL_Z": 0.0}),
+            [("WPNAV_ACCEL_Z", "parameter_not_positive")],
+        ),
         (RELEASES["3.6"].log(older_steps(), parameters={"H_SW_TYPE": 1.0}), [("file", "not_a_copter")]),
         (
             RELEASES["3.4"].log(replace(older_steps(), gains={**OLDER, "PSC_ACCZ_I": 0.0})),
