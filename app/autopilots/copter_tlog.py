@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from app.autopilots.ardupilot import logged_flight as ardupilot_flight
-from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop, read_ardupilot
+from app.autopilots.ardupilot.experiments import ArduPilotLoop, read_ardupilot
 from app.autopilots.ardupilot.log import MODES
 from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
@@ -193,7 +193,7 @@ class _Reader:
 
     def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
         if self.autopilot.shapes_reference:
-            loop = replace(ardupilot_loop(given), has_newer_names=ardupilot_flight.has_newer_names(self.recording))
+            loop = ardupilot_flight.ardupilot_loop_of(self.recording, given)
             return read_ardupilot(loop, trajectory, self._steps(trajectory))
         hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
         whole = FlownSteps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
@@ -291,11 +291,8 @@ class _Reader:
         """By the names of the vehicle's release."""
         known = {*given, self.autopilot.learned, *_IN_TAKEOFFS, *_MAY_LACK}
         absent = [each for each in self.autopilot.kept if each not in known]
-        return (
-            tuple(in_newer_names(dict.fromkeys(absent, 0.0)))
-            if ardupilot_flight.has_newer_names(self.recording)
-            else tuple(absent)
-        )
+        own = ardupilot.names_of({each.name for each in self.recording.settings})
+        return tuple(in_newer_names(dict.fromkeys(absent, 0.0), own))
 
     @property
     def _mode(self) -> str:

@@ -6,14 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.experiments import ardupilot_loop
-from app.autopilots.ardupilot.logged_flight import HOLDS_ALTITUDE, has_newer_names
+from app.autopilots.ardupilot.logged_flight import HOLDS_ALTITUDE, ardupilot_loop_of
 from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.px4.experiments import px4_loop
 from app.autopilots.px4.logged_flight import LEFT_OUT_MODES, has_thrust_gains
 from app.autopilots.px4.replica.parameters import in_accelerations
-from app.autopilots.recording import EventKind, Recording, Rows
-from app.autopilots.segments import find_landings, within_limits
+from app.autopilots.recording import EventKind, Recording
+from app.autopilots.segments import find_landings, in_flight, within_limits
 from app.core.analysis.description import LONGEST_GAP_S, FlightSignals
 from app.core.analysis.loop import AltitudeLoop
 from app.core.errors import InputError
@@ -22,8 +21,6 @@ from app.core.records.trajectory import Samples
 _REFERENCES: Final = ("desired_altitude_m", "reference_m", "target_altitude_m", "set_point_m")
 _THROTTLES: Final = ("thrust_target", "thrust", "demanded_throttle", "throttle")
 """The first is the vertical part."""
-_IDLE: Final = 0.15
-_HOP_M: Final = 0.5
 _LARGEST: Final = 1e6
 
 
@@ -34,10 +31,12 @@ def signals_of(recording: Recording) -> FlightSignals | None:
     time_s = recording.columns["altitude_m"].time_s
     altitude_m = _known(recording, ("altitude_m",), time_s)
     climb_rate_m_s = _known(recording, ("climb_rate_m_s",), time_s)
-    if not np.isfinite(climb_rate_m_s).any() and len(time_s) > 1:
-        climb_rate_m_s = np.gradient(altitude_m, time_s)
     throttle = within_limits(_known(recording, _THROTTLES, time_s) * _lean(recording, time_s))
-    flown = _flown(recording, time_s, altitude_m, throttle)
+    flown = in_flight(recording, altitude_m, throttle)
+    slope_m_s = np.gradient(altitude_m, time_s) if len(time_s) > 1 else np.full(1, np.nan)
+    biased = (climb_rate_m_s - slope_m_s)[flown]
+    biased = biased[np.isfinite(biased)]
+    climb_rate_m_s = climb_rate_m_s - np.median(biased) if biased.size else slope_m_s
     reference_m = _known(recording, _REFERENCES, time_s)
     if "reference_error_m" in recording.columns:
         reference_m = altitude_m + _known(recording, ("reference_error_m",), time_s)
@@ -76,7 +75,7 @@ def loop_of(recording: Recording, at_s: float, hover_throttle: float) -> Altitud
 
 
 _LOOPS: Final[Mapping[str, Callable[[Recording, Mapping[str, float], float | None], AltitudeLoop]]] = {
-    "ardupilot": lambda recording, given, _: replace(ardupilot_loop(given), has_newer_names=has_newer_names(recording)),
+    "ardupilot": lambda recording, given, _: ardupilot_loop_of(recording, given),
     "px4": lambda _, given, thrust_gains_at: replace(px4_loop(given), thrust_gains_at=thrust_gains_at),
 }
 
@@ -98,20 +97,3 @@ def _lean(recording: Recording, time_s: Samples) -> Samples:
         return np.ones(len(time_s))
     roll, pitch = (np.radians(np.nan_to_num(_known(recording, (each,), time_s))) for each in ("roll_deg", "pitch_deg"))
     return np.asarray(np.cos(roll) * np.cos(pitch) * np.nan_to_num(_known(recording, ("lean",), time_s), nan=1.0))
-
-
-def _flown(recording: Recording, time_s: Samples, altitude_m: Samples, throttle: Samples) -> Rows:
-    """Rows in the air: by the autopilot's own reports, else by the throttle, else above the lowest altitude."""
-    if recording.in_air is not None:
-        flown = np.zeros(len(time_s), dtype=np.bool_)
-        for span in recording.in_air:
-            flown |= (time_s >= span.begin_s) & (time_s < span.end_s)
-        return flown
-    if recording.events_of(EventKind.LIFT_OFF):
-        flown = np.zeros(len(time_s), dtype=np.bool_)
-        for event in recording.events_of(EventKind.LIFT_OFF, EventKind.LANDING, EventKind.BOOT):
-            flown[time_s >= event.time_s] = event.kind is EventKind.LIFT_OFF
-        return flown
-    if np.isfinite(throttle).any():
-        return np.asarray(throttle > _IDLE)
-    return np.asarray(altitude_m > np.nanmin(altitude_m) + _HOP_M)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.autopilots.recording import LONGEST_INTERVAL_S, ParameterHistory, Parameters, Rows
+from app.autopilots.recording import LONGEST_INTERVAL_S, EventKind, ParameterHistory, Parameters, Recording, Rows, Span
 from app.core.errors import TrajectoryError
 from app.core.reasons import LEFT_OUT, Reason, ReasonCode
 from app.core.records.trajectory import Samples
@@ -23,7 +23,9 @@ _DESCENT_M_S: Final = 0.1
 _DESCENT_S: Final = 1.0
 _UNSEEN_S: Final = 2.0
 """A touchdown that much later than the last row before it was not recorded."""
-_BEYOND_LIMIT: Final = 1e-3
+_ABOVE_GROUND_M: Final = 0.5
+_TELLING: Final = (EventKind.BOOT, EventKind.MOTORS_ON, EventKind.LIFT_OFF, EventKind.LANDING, EventKind.MOTORS_OFF)
+"""Events after which it is known whether the vehicle is in the air, or not any more."""
 
 Part = tuple[int, int]
 """First row, and the row after the last."""
@@ -46,10 +48,10 @@ _HELD: Final = frozenset(
 """What these conditions leave is flown with the altitude held."""
 
 
-def within_limits(throttle: Samples) -> Samples:
-    """Shares of full throttle, shape (n,), of which those hardly below 0 or above 1 are these; NaN for what is not a
-    throttle."""
-    near = (throttle >= -_BEYOND_LIMIT) & (throttle <= 1.0 + _BEYOND_LIMIT)
+def within_limits(throttle: Samples, beyond: float = 1e-3) -> Samples:
+    """Shares of full throttle, shape (n,), of which those less than `beyond` below 0 or above 1 are these; NaN for what
+    is not a throttle."""
+    near = (throttle >= -beyond) & (throttle <= 1.0 + beyond)
     return np.where(near, np.clip(throttle, 0.0, 1.0), np.nan)
 
 
@@ -63,6 +65,39 @@ def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> R
     """Rows, shape (n,), whose value differs by more than `largest` from what its rate made of the one before."""
     followed = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time_s)
     return np.append(False, np.abs(np.diff(values) - followed) > largest)
+
+
+def in_flight(
+    recording: Recording, altitude_m: Samples, thrust: Samples, *, after_s: float = 0.0, before_s: float = 0.0
+) -> Rows:
+    """Rows of the altitude, shape (n,), between takeoff and landing, by the vehicle's own reports, but for the seconds
+    after each lift-off and before each touchdown. Where none tells whether it flew, as in a log that begins in the air,
+    those above the lowest altitude, which is 0 or less, with thrust, as far as that is known, and armed motors."""
+    time_s = recording.columns["altitude_m"].time_s
+    if recording.in_air is not None:
+        return _within(time_s, recording.in_air)
+    lowest_m = np.min(altitude_m[np.isfinite(altitude_m)], initial=0.0)
+    is_up = (altitude_m > lowest_m + _ABOVE_GROUND_M) & ~(thrust <= 0.0)
+    if recording.armed is not None:
+        return is_up & _within(time_s, recording.armed)
+    flying, unknown_from_s = is_up, -np.inf
+    for event in recording.events_of(*_TELLING):
+        if event.kind in (EventKind.MOTORS_ON, EventKind.LIFT_OFF):
+            flying = flying & (time_s < unknown_from_s)
+        if event.kind is EventKind.LIFT_OFF:
+            flying = flying | (time_s >= event.time_s + after_s)
+        else:
+            flying = flying & (time_s < event.time_s - before_s)
+        unknown_from_s = event.time_s if event.kind is EventKind.BOOT else np.inf
+        flying = flying | (is_up & (time_s >= unknown_from_s))
+    return flying
+
+
+def _within(time_s: Samples, spans: Iterable[Span]) -> Rows:
+    inside = np.zeros(len(time_s), dtype=np.bool_)
+    for span in spans:
+        inside |= (time_s >= span.begin_s) & (time_s < span.end_s)
+    return inside
 
 
 def find_landings(time_s: Samples, altitude_m: Samples, climb_rate_m_s: Samples, downs_s: Iterable[float]) -> Rows:

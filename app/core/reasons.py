@@ -31,6 +31,7 @@ class ReasonCode(Enum):
     NEVER_ARMED = "never reports armed motors"
     NEVER_FLEW = "has no flight: the vehicle never left the ground"
     NO_ALTITUDE_CHANGES = "has no altitude changes: the reference moves by {reference_range_m:.2f} m"
+    NO_CLOCK = "has no message with the time (TimeUS or TimeMS)"
     NO_DATA = "has no data: copy the whole log"
     NO_STEPS = "has no altitude step in {named} in flight after {rest_s:g} s at rest"
     NO_WHOLE_CHANGE = "has no altitude change that both begins and ends: slope, lag and drag cannot be told apart"

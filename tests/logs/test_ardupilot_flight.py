@@ -87,7 +87,7 @@ def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
 
 def test_parameters_of_release_4_7_are_read_by_their_new_names_and_units() -> None:
     older, newer = (read(ardupilot_log(gusty(), parameters=each)) for each in (PARAMETERS, NEWER_PARAMETERS))
-    assert (loop_of(older).has_newer_names, loop_of(newer).has_newer_names) == (False, True)
+    assert (loop_of(older).names, loop_of(newer).names["PSC_ACCZ_P"]) == ({}, ("PSC_D_ACC_P", 0.1))
     assert loop_of(newer).parameters == loop_of(older).parameters
     assert newer.loop.named({"PSC_ACCZ_P": 0.5}) == {"PSC_D_ACC_P": 0.05}
 
@@ -97,6 +97,16 @@ def test_every_mode_that_holds_altitude_counts_and_landing_does_not() -> None:
         gusty(), modes=((0.0, LOITER), (15.0, GUIDED), (22.0, LAND)), events=((0.0, NOT_LANDED), (60.0, LANDED))
     )
     assert spans_s(read(log)) == [(10.0, 21.9)]
+
+
+@pytest.mark.parametrize(("mode", "holds"), [(13, True), (21, True), (24, True), (1, False), (8, False), (11, False)])
+def test_rarer_modes_hold_altitude_or_not(mode: int, holds: bool) -> None:
+    """SPORT, SMART_RTL, ZIGZAG; ACRO, POSITION, DRIFT."""
+    log = ardupilot_log(gusty(), modes=((0.0, mode),))
+    if holds:
+        assert spans_s(read(log)) == [(10.0, 26.9)]
+    else:
+        assert refusal(log) == ("MODE", "altitude_not_held")
 
 
 def test_the_seconds_around_takeoff_and_landing_are_left_out() -> None:
@@ -282,7 +292,7 @@ def test_release_4_1_logs_the_same_loop_positive_up() -> None:
     older, newer = (read(ardupilot_log(gusty(), is_upward=each)) for each in (True, False))
     for each in fields(Segment):
         assert getattr(older.segments[0], each.name) == pytest.approx(getattr(newer.segments[0], each.name)), each.name
-    assert refusal(ardupilot_log(gusty(), is_upward=True).replace(b",TVZ", b",XVZ")) == ("PSCD.TVD", "column_missing")
+    assert refusal(ardupilot_log(gusty(), is_upward=True).replace(b",TVZ", b",XVZ")) == ("PSCZ.TVZ", "column_missing")
 
 
 def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_named() -> None:
@@ -419,15 +429,22 @@ def test_another_thrust_curve_ends_a_part() -> None:
         ({"LOG_BITMASK": 176126.0}, "message_missing"),
         ({}, "message_missing"),
         ({"LOG_BITMASK": 2.0}, "log_bit_unset"),
-        ({"LOG_BITMASK": 2.0, "POS_Z_P": 1.0}, "message_missing"),
     ],
 )
 @pytest.mark.parametrize("message", [b"PSCD", b"CTUN"])
-def test_a_bit_is_to_be_set_only_if_it_is_not_and_would_help(
-    message: bytes, parameters: dict[str, float], code: str
-) -> None:
+def test_a_bit_is_to_be_set_only_if_it_is_not(message: bytes, parameters: dict[str, float], code: str) -> None:
     content = ardupilot_log(gusty(), parameters={**PARAMETERS, **parameters})
     assert refusal(content.replace(message, b"X" + message[1:])) == (message.decode(), code)
+
+
+def test_a_message_that_a_release_never_logs_is_not_asked_for() -> None:
+    until_4_0 = {name: value for name, value in PARAMETERS.items() if name != "PSC_VELZ_I"}
+    content = ardupilot_log(gusty(), parameters={**until_4_0, "LOG_BITMASK": 2.0})
+    assert refusal(content.replace(b"PSCD", b"XSCD")) == ("CTUN.Alt", "column_missing")
+
+
+def test_a_log_without_its_modes_is_refused_as_such() -> None:
+    assert refusal(ardupilot_log(gusty(), modes=())) == ("MODE", "message_missing")
 
 
 @pytest.mark.parametrize(

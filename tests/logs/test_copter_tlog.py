@@ -122,7 +122,7 @@ def test_rows_in_which_more_than_a_position_was_commanded_are_left_out() -> None
 def test_the_names_and_units_of_release_4_7_are_kept(flight: LoggedFlight) -> None:
     found = read(replace(STEPS, parameters=NEWER_PARAMETERS).content)
     assert isinstance(found.loop, ArduPilotLoop)
-    assert found.loop.has_newer_names
+    assert found.loop.names["PSC_ACCZ_P"] == ("PSC_D_ACC_P", 0.1)
     assert found.loop.gains == pytest.approx(flight.loop.gains)
     assert "PSC_D_VEL_I" in found.assumed
 

@@ -102,10 +102,10 @@ def test_it_is_recognised_with_what_was_printed_before_it() -> None:
 
 def test_modes_are_numbers_by_name_whoever_converted_the_log() -> None:
     """Of those at the same time the last one counts."""
-    names = ("AltHold", "ALT_HOLD", "GUIDED", "2", "Mode(77)", "UNKNOWN")
+    names = ("AltHold", "ALT_HOLD", "GUIDED", "2", "Mode(77)", "UNKNOWN", "SMART_RTL")
     log = PREAMBLE + "".join(f"CTUN, {5000 + 100 * row}, 1, 0\nMODE, {name}, 0\n" for row, name in enumerate(names))
     mode = read_ardupilot(io.BytesIO(log.encode())).columns["mode"]
-    assert str(mode.values.tolist()) == "[2.0, 2.0, 4.0, 2.0, nan, nan]"
+    assert str(mode.values.tolist()) == "[2.0, 2.0, 4.0, 2.0, nan, nan, 21.0]"
 
 
 def test_a_takeoff_is_found_in_it() -> None:

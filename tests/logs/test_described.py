@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.autopilots.ardupilot.log import read_ardupilot
+from app.autopilots.ardupilot.logged_flight import ardupilot_flight
 from app.autopilots.described import loop_of, signals_of
 from app.autopilots.px4.log import read_px4
 from app.autopilots.recording import Recording
@@ -101,3 +102,21 @@ def test_there_is_no_loop_without_its_gains_or_with_what_a_replica_lacks() -> No
     without = {name: value for name, value in PARAMETERS.items() if name != "PSC_ACCZ_I"}
     for parameters in (without, {**PARAMETERS, "PSC_ACCZ_SMAX": 5.0}):
         assert loop_of(copter(ardupilot_log(flight, parameters=parameters)), 20.0, 0.4) is None
+
+
+@pytest.mark.parametrize("events", [(), ((20.0, LANDED),), ((15.0, NOT_LANDED),)])
+def test_a_log_that_begins_in_the_air_is_described_by_the_rule_of_the_analysis(
+    events: tuple[tuple[float, int], ...],
+) -> None:
+    """The part that is analysed begins some seconds after each event, and ends some before."""
+    recording = copter(ardupilot_log(simulated_flight(QUIET), events=events))
+    (segment,) = ardupilot_flight(recording, "flight.bin").segments
+    found = described(recording)
+    assert segment.duration_s <= found.held_s + 0.11 <= segment.duration_s + 3.3
+
+
+def test_a_biased_climb_rate_does_not_hide_that_the_vehicle_is_at_rest() -> None:
+    flight = simulated_flight(QUIET)
+    (segment,) = flight.segments
+    biased = replace(flight, segments=[replace(segment, v_m_s=segment.v_m_s - 0.35)])
+    assert described(copter(ardupilot_log(biased))).hover_throttle == pytest.approx(0.4, abs=0.01)

@@ -15,6 +15,7 @@ VIBRATION_FAILSAFE = 29
 PARAMETERS: Mapping[str, float] = {
     "PSC_POSZ_P": 1.0,
     "PSC_VELZ_P": 5.0,
+    "PSC_VELZ_I": 0.0,
     "PSC_ACCZ_P": 0.5,
     "PSC_ACCZ_I": 1.0,
     "MOT_THST_HOVER": 0.35,

@@ -7,7 +7,7 @@ it fits the recorded reference best.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Final
@@ -66,6 +66,7 @@ an integral gain of the acceleration the firmware does not arm, and a wrong hove
 _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
 _LARGEST_MISFIT_M: Final = 0.1
+_AT_REST_M_S: Final = 1e-3
 _DYNAMIC: Final = [
     vertical.THROTTLE,
     vertical.THROTTLE_FILTERED,
@@ -84,13 +85,15 @@ _NUDGE: Final = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArduPilotLoop(CopterLoop):
-    """The loop (`AltitudeLoop`). `filter_hz` is the cut-off of the accelerometer's filter. `has_newer_names` if the
-    vehicle's parameters have the names and units of release 4.7. The acceleration in the log is the sensed one, or the
-    change of the climb rate over `row_s`, a whole number of steps."""
+    """The loop (`AltitudeLoop`). `filter_hz` is the cut-off of the accelerometer's filter. `names` are those that the
+    vehicle has for parameters instead of the names of releases 4.0 to 4.6, with the factor to its unit. Until 4.0 the
+    loop `differentiates` its climb rate target, instead of shaping an acceleration. The acceleration in the log is the
+    sensed one, or the change of the climb rate over `row_s`, a whole number of steps."""
 
     parameters: Parameters
     filter_hz: float
-    has_newer_names: bool = False
+    names: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    differentiates: bool = False
     row_s: float | None = None
 
     texts = LoopTexts(
@@ -145,11 +148,12 @@ class ArduPilotLoop(CopterLoop):
         return accelerometer_filter(self.filter_hz, self.step_s)
 
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:
-        return in_newer_names(gains) if self.has_newer_names else dict(gains)
+        return in_newer_names(gains, self.names)
 
     def documented(self, hover_throttle: float) -> dict[str, dict[str, float]]:
         p, i = (float(f"{factor * hover_throttle:.2g}") for factor in (1.0, 2.0))
-        name = f"P = {'0.1 ' if self.has_newer_names else ''}hover throttle, I = 2 P"
+        factor = self.names.get("PSC_ACCZ_P", ("", 1.0))[1]
+        name = f"P = {'' if factor == 1.0 else f'{factor:g} '}hover throttle, I = 2 P"
         return {name: {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": p, "PSC_ACCZ_I": i}}
 
     def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
@@ -160,11 +164,20 @@ class ArduPilotLoop(CopterLoop):
         ]
 
     def climb_rate_targets(self, segment: Segment) -> Samples:
-        return climb_rate_targets(self.parameters, segment.z_d_m - segment.z_m, segment.v_d_m_s)
+        """A reference at rest has no desired climb rate, even where that was not logged."""
+        desired = np.where(np.abs(segment.moves_m_s) < _AT_REST_M_S, 0.0, segment.v_d_m_s)
+        return climb_rate_targets(self.parameters, segment.z_d_m - segment.z_m, desired)
 
     def excitation(self, segment: Segment, throttle: float) -> tuple[Samples, Samples]:  # noqa: ARG002
-        """Those of the reference, which the loop shapes itself."""
-        return segment.v_d_m_s, segment.a_d_m_s2
+        """Those of the reference, which the loop shapes itself; before, those of a vehicle that has each climb rate at
+        once."""
+        if not self.differentiates:
+            return segment.v_d_m_s, segment.a_d_m_s2
+        p = self.parameters.position_p_1_s
+        sought_m = segment.z_d_m - segment.z_d_m[0] + segment.v_d_m_s / p
+        gain = -np.expm1(-p * np.median(np.diff(segment.time_s)))
+        v_m_s = p * (sought_m - filtered(sought_m, (np.array([gain]), np.array([1.0, gain - 1.0]))))
+        return v_m_s, np.gradient(v_m_s, segment.time_s)
 
     def start(self, steps: Steps) -> tuple[float, float]:
         _, v_d, a_d, _ = steps.reference[0].tolist()
@@ -174,7 +187,7 @@ class ArduPilotLoop(CopterLoop):
         return copter.packed(filter_hz=self.filter_hz, dt_s=self.step_s)
 
     def fly(self, run: Run) -> Samples:
-        packed = vertical.packed(self.parameters, self.step_s)
+        packed = vertical.packed(self.parameters, self.step_s, differentiates=self.differentiates)
         state, flown = np.empty(vertical.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
         vertical.start_hover(state, packed, *run.start)
         body = start_body(*run.start, run.copter)
@@ -184,20 +197,22 @@ class ArduPilotLoop(CopterLoop):
     def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
         """The copter is late by more lag of its motors."""
         late = replace(copter, motor_lag_s=copter.motor_lag_s + late_s)
-        p, packed = vertical.packed(self.parameters, self.step_s), self.packed(late)
-        return transition_of(lambda nudge: _after_step(p, packed, nudge), len(_DYNAMIC), _NUDGE)
+        p = vertical.packed(self.parameters, self.step_s, differentiates=self.differentiates)
+        dynamic = [*_DYNAMIC, vertical.V_T] if self.differentiates else _DYNAMIC
+        step = partial(_after_step, p, self.packed(late), dynamic)
+        return transition_of(step, len(dynamic), _NUDGE)
 
 
-def _after_step(p: vertical.Packed, copter: Samples, nudge: Samples) -> Samples:
+def _after_step(p: vertical.Packed, copter: Samples, dynamic: list[int], nudge: Samples) -> Samples:
     hover = float(copter[HOVER_THROTTLE])
     state = np.empty(vertical.STATE_SIZE)
     vertical.start_hover(state, p, hover, 0.0, 0.0, 0.0)
     state[vertical.RESET] = 0.0
     state[vertical.ACCELERATION_SUM] = 1000.0 * (hover - p[vertical.HOVER])
-    state[_DYNAMIC] += nudge[: len(_DYNAMIC)]
-    body = start_body(hover, 0.0, 0.0, 0.0, copter) + nudge[len(_DYNAMIC) :]
+    state[dynamic] += nudge[: len(dynamic)]
+    body = start_body(hover, 0.0, 0.0, 0.0, copter) + nudge[len(dynamic) :]
     vertical.step(state, body, p, copter, np.zeros(len(REFERENCE)), np.zeros(len(DISTURBANCES)))
-    return np.concatenate([state[_DYNAMIC], body])
+    return np.concatenate([state[dynamic], body])
 
 
 class ArduPilotSteps(CopterSteps):

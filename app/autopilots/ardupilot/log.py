@@ -24,7 +24,9 @@ from app.autopilots.recording import (
     left_out,
     restarts,
 )
-from app.logs.base import Table, contents, numbers, refused, rows_of
+from app.core.reasons import Reason, ReasonCode, refusal
+from app.core.records.trajectory import Samples
+from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.boots import CLOCK
 from app.logs.dataflash import parameters_in, read_tables
 
@@ -40,7 +42,7 @@ LOOP: Final[Mapping[str, Source]] = {
 }
 """The vertical controller's own message. The desired motion is shaped: releases before 4.6 log its altitude as the
 reference."""
-_UPWARD: Final[Mapping[str, Source]] = {
+UPWARD: Final[Mapping[str, Source]] = {
     "altitude_m": Source("PSCZ", "PZ"),
     "climb_rate_m_s": Source("PSCZ", "VZ"),
     "acceleration_m_s2": Source("PSCZ", "AZ"),
@@ -50,11 +52,20 @@ _UPWARD: Final[Mapping[str, Source]] = {
     "reference_m": Source("PSCZ", "TPZ"),
 }
 """The same in release 4.1, positive up."""
+TUNING: Final[Mapping[str, Source]] = {
+    "altitude_m": Source("CTUN", "Alt"),
+    "climb_rate_m_s": Source("CTUN", "CRt", 0.01),
+    "acceleration_m_s2": Source("RATE", "A", 0.01),
+    "climb_rate_target_m_s": Source("CTUN", "DCRt", 0.01),
+    "reference_m": Source("CTUN", "DAlt"),
+}
+"""What releases before 4.1 log of it, 3.4 and later completely. The reference is 0 where the loop is not in control."""
+LOOPS: Final = (LOOP, UPWARD, TUNING)
 TERMS: Final = ("P", "I", "D", "FF", "DFF")
 """Of the acceleration controller, in ‰ of throttle."""
 NOT_POSITION: Final = ("Terrain", "vX", "vY", "vZ", "aX", "aY", "aZ")
 """Columns of a target in GUIDED, beside the altitude."""
-_BESIDE: Final[Mapping[str, Source]] = {
+BESIDE: Final[Mapping[str, Source]] = {
     "demanded_throttle": Source("CTUN", "ThI"),
     "thrust": Source("CTUN", "ThO"),
     "hover_throttle": Source("CTUN", "ThH"),
@@ -69,9 +80,9 @@ _BESIDE: Final[Mapping[str, Source]] = {
 }
 _ROWS: Final[Mapping[str, tuple[Collection[str], int]]] = {"BAT": (("Inst", "Instance"), 0), "ERR": (("Subsys",), 29)}
 """The first battery, and the failsafe for vibration, which replaces the loop."""
-_WITHOUT_LOOP: Final = {"altitude_m": Source("CTUN", "Alt"), "reference_m": Source("CTUN", "DAlt")}
+_UNTIL_3_3: Final[Mapping[str, Source]] = {"thrust": Source("CTUN", "ThrOut", 0.001)}
 _WANTED: Final = frozenset(
-    {"PARM", "MAVC", "EV", "MSG", *(each.message for each in (*LOOP.values(), *_UPWARD.values(), *_BESIDE.values()))}
+    {"PARM", "MAVC", "EV", "MSG", *(each.message for part in (*LOOPS, BESIDE) for each in part.values())}
 )
 
 _ACCEPTED: Final = (0, 5)
@@ -86,7 +97,10 @@ _EVENTS: Final[Mapping[float, tuple[EventKind, str]]] = MappingProxyType(
 MODES: Final[Mapping[float, str]] = MappingProxyType(
     {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
 )
-_MODES_AS_TEXT: Final = {name.replace("_", "").encode(): number for number, name in {**MODES, 7: "CIRCLE"}.items()}
+_MODES_AS_TEXT: Final = {
+    name.upper().replace("_", "").replace(" ", "").encode(): float(number)
+    for number, name in ARDUPILOT.mode_names.items()
+}
 _UNTIL_RESTART: Final = ("mode", "vibration_failsafe")
 """States that a vehicle that starts anew reports only as they change."""
 _NO_CLOCK_HINT: Final = "Releases of ArduCopter before 3.1 log no time: use a log of a newer one."
@@ -100,12 +114,13 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
     """Decode a whole log, binary or as text. Raises TrajectoryError if no message in it has the time."""
     log = read_tables(contents(stream), _WANTED)
     if log.tables and not any(CLOCK in table for table in log.tables.values()):
-        raise refused("has no message with the time (TimeUS or TimeMS)", _NO_CLOCK_HINT)
+        raise refusal("This file cannot be read as a flight.", _NO_CLOCK_HINT, [Reason(code=ReasonCode.NO_CLOCK)])
     tables = log.tables | {name: _only(log.tables[name], *which) for name, which in _ROWS.items() if name in log.tables}
     tables["MODE"] = _with_numbers(tables.get("MODE", {}))
-    loop = next((each for each in (LOOP, _UPWARD) if _is_logged(each["altitude_m"], tables)), {**LOOP, **_WITHOUT_LOOP})
-    sources = {**loop, **_BESIDE}
-    columns = columns_of(tables, {name: _in_si(each, log.factors) for name, each in sources.items()}, clock=CLOCK)
+    sources = {name: _in_si(each, log.factors) for name, each in {**BESIDE, **_loop(tables)}.items()}
+    columns = columns_of(tables, _UNTIL_3_3, clock=CLOCK) | columns_of(tables, sources, clock=CLOCK)
+    if (found := columns.get("reference_m")) is not None and found.source == str(TUNING["reference_m"]):
+        columns["reference_m"] = replace(found, values=np.where(found.values == 0.0, np.nan, found.values))
     columns |= {name: _until_restart(columns[name], log.boots_s) for name in _UNTIL_RESTART if name in columns}
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
     firmware, release = _firmware(tables)
@@ -144,13 +159,23 @@ def _events(tables: Mapping[str, Table], boots_s: Sequence[float]) -> Iterator[E
             yield Event(_EVENTS[event][0], time_s, _EVENTS[event][1])
 
 
-def _is_logged(source: Source, tables: Mapping[str, Table]) -> bool:
-    return {CLOCK, source.field} <= tables.get(source.message, {}).keys()
+def _loop(tables: Mapping[str, Table]) -> Mapping[str, Source]:
+    """Where the loop is from: its own message, unless that lacks most of the time in which it flies."""
+    reference, thrust = (_values(each, tables) for each in (TUNING["reference_m"], BESIDE["thrust"]))
+    controlled = np.count_nonzero(reference * thrust) if len(reference) == len(thrust) else 0
+    own = (each for each in (LOOP, UPWARD) if 2 * len(_values(each["altitude_m"], tables)) > controlled)
+    return next(own, TUNING)
+
+
+def _values(source: Source, tables: Mapping[str, Table]) -> Samples:
+    """All values of a field; none if it was not logged."""
+    return numbers(tables.get(source.message, {}).get(source.field, np.empty(0)))
 
 
 def _in_si(source: Source, factors: Mapping[str, Mapping[str, float]]) -> Source:
-    """The source of values in SI, of which the log tells the factor, or which have it already."""
-    return replace(source, factor=source.factor * factors.get(source.message, {}).get(source.field, 1.0))
+    """The source of values in SI, by the factor that the log tells, or else by that of the releases that do not."""
+    given = factors.get(source.message, {}).get(source.field)
+    return source if given is None else replace(source, factor=np.copysign(given, source.factor))
 
 
 def _until_restart(column: Column, boots_s: Sequence[float]) -> Column:

@@ -1,56 +1,53 @@
 """A whole flight's altitude control in ArduPilot's on-board log (.bin), in every mode that holds altitude."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.experiments import ArduPilotLoop
-from app.autopilots.ardupilot.log import LOOP, history
+from app.autopilots.ardupilot.experiments import ArduPilotLoop, ardupilot_loop
+from app.autopilots.ardupilot.log import BESIDE, LOOP, LOOPS, TUNING, history
 from app.autopilots.ardupilot.replica.parameters import (
-    ACCELEROMETER_FILTER,
-    ACCELEROMETER_FILTER_HZ,
     LOOP_NAMES,
-    LOOP_RATE,
-    LOOP_RATE_HZ,
-    LOOP_RATES_HZ,
-    NEWER_NAMES,
     in_newer_names,
-    parameters_from,
+    in_older_names,
+    names_of,
 )
-from app.autopilots.recording import EventKind, Recording, Rows
+from app.autopilots.ardupilot.replica.replay import climb_rate_targets
+from app.autopilots.recording import EventKind, Recording, Rows, Source
 from app.autopilots.segments import (
     LARGEST_LEAN,
     Condition,
-    Refused,
     choose_parts,
     find_landings,
     has_neighbour,
+    in_flight,
     jumps,
     thinned,
     within_limits,
 )
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment
-from app.core.control.parameter_checks import require_within
+from app.core.errors import TrajectoryError
 from app.core.reasons import Reason, ReasonCode, refusal
 from app.core.records.trajectory import Samples
 
 _TUNING: Final = ("demanded_throttle", "thrust", "hover_throttle")
-_ONE_OF_TWO: Final = (["desired_altitude_m"], ["reference_m"])
+_REFERENCES: Final = frozenset({"desired_altitude_m", "reference_m"})
 """Columns without which the other one is the reference."""
-HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 16, 17)
-"""ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
+HOLDS_ALTITUDE: Final = (2, 3, 4, 5, 6, 7, 10, 13, 15, 16, 17, 19, 21, 22, 23, 24, 27)
+"""ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, OF_LOITER, SPORT, AUTOTUNE, POSHOLD, BRAKE, AVOID_ADSB, SMART_RTL,
+FLOWHOLD, FOLLOW, ZIGZAG, AUTO_RTL."""
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
-_ABOVE_GROUND_M: Final = 1.0
-_TELLING: Final = (EventKind.BOOT, EventKind.MOTORS_ON, EventKind.LIFT_OFF, EventKind.LANDING, EventKind.MOTORS_OFF)
-"""Events after which it is known whether the vehicle is in the air, or not any more."""
 _JUMP_M: Final = 0.1
 _JUMP_M_S: Final = 1.0
 _LARGEST_ACCELERATION_M_S2: Final = 50.0
+_LARGEST_DEMAND: Final = 10.0
+"""So far beyond its limits the loop may demand throttle."""
 _LEARNED: Final = "MOT_THST_HOVER"
 _THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX")
 _USED: Final = frozenset({*LOOP_NAMES, *_THRUST_CURVE} - {_LEARNED})
@@ -66,9 +63,18 @@ _FIRMWARES: Final[Mapping[str, str]] = MappingProxyType(
         "Rover": "rover",
     }
 )
-_UNTIL_4_0: Final = frozenset({"THR_ALT_P", "POS_Z_P", "PSC_ACC_XY_FILT"})
-"""Parameters of releases that do not log this loop, whatever their LOG_BITMASK."""
-_LOG_BITS: Final[Mapping[str, int]] = MappingProxyType({"CTUN": 1 << 4, "NTUN": 1 << 5})
+_SINCE_4_1: Final = "PSC_VELZ_I"
+"""A parameter of all releases whose loop shapes its acceleration, and that log it in a message of its own."""
+_CONSTANTS_UNTIL_4_0: Final[Mapping[str, float]] = MappingProxyType({"PSC_VELZ_FLTE": 4.0})
+_LOG_BITS: Final[Mapping[str, tuple[str, int]]] = MappingProxyType(
+    {
+        "CTUN": ("CTUN", 1 << 4),
+        "PSCD": ("NTUN", 1 << 5),
+        "PSCZ": ("NTUN", 1 << 5),
+        "RATE": ("ATTITUDE_MED", 1 << 0 | 1 << 1),
+    }
+)
+"""The bit of LOG_BITMASK for a message, and those of which one suffices."""
 
 
 def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
@@ -76,11 +82,13 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.
     """
-    refused = _refused(recording, name)
+    refused = partial(_refusal, recording, name)
     _require_messages(recording, refused)
-    time_s = recording.columns["altitude_m"].time_s
+    altitude = recording.columns["altitude_m"]
+    time_s, message = altitude.time_s, altitude.source.partition(".")[0]
     lean = _lean(recording, time_s)
-    throttle = [within_limits(recording.columns[each].beside(time_s)) for each in _TUNING]
+    demanded, *used = (recording.columns[each].beside(time_s) for each in _TUNING)
+    throttle = [within_limits(demanded, _LARGEST_DEMAND), *map(within_limits, used)]
     rows = _rows(recording, lean, throttle)
     motion = (rows.z_d_m, rows.z_m, rows.v_m_s, rows.a_m_s2, rows.v_d_m_s, rows.a_d_m_s2, rows.v_t_m_s, *throttle)
     is_sound = np.isfinite(np.sum(motion, axis=0)) & (np.abs(rows.a_m_s2) <= _LARGEST_ACCELERATION_M_S2)
@@ -88,12 +96,12 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
     given, chosen = choose_parts(
         time_s,
         (
-            Condition(_in_flight(recording, time_s), ReasonCode.NEVER_FLEW, "EV"),
+            Condition(_in_flight(recording), ReasonCode.NEVER_FLEW, "EV"),
             Condition(_holds_altitude(recording, time_s), ReasonCode.ALTITUDE_NOT_HELD, "MODE"),
             Condition(~_landings(recording, time_s), ReasonCode.ONLY_TAKEOFFS_OR_LANDINGS, "EV"),
             Condition(is_calm, ReasonCode.VIBRATION_FAILSAFE, "ERR"),
-            Condition(has_neighbour(time_s), ReasonCode.GAPS, "PSCD"),
-            Condition(is_sound, ReasonCode.NOT_NUMBERS, "PSCD"),
+            Condition(has_neighbour(time_s), ReasonCode.GAPS, message),
+            Condition(is_sound, ReasonCode.NOT_NUMBERS, message),
             Condition(lean >= LARGEST_LEAN, ReasonCode.LEANS, "ATT"),
         ),
         _is_reset(rows),
@@ -103,37 +111,67 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
         ArduPilotLoop.space.bounds,
         lambda gain: Reason(code=ReasonCode.PARAMETER_MISSING, field=gain, named=[*in_newer_names({gain: 0.0})]),
     )
-    require_within(given, {LOOP_RATE: LOOP_RATES_HZ})
     hover = float(np.median(np.concatenate([rows.assumed_hover[slice(*part)] for part in chosen])))
-    return LoggedFlight(
-        loop=ArduPilotLoop(
-            parameters=parameters_from({**given, _LEARNED: hover}),
-            filter_hz=given.get(ACCELEROMETER_FILTER, ACCELEROMETER_FILTER_HZ),
-            step_s=1.0 / given.get(LOOP_RATE, LOOP_RATE_HZ),
-            has_newer_names=has_newer_names(recording),
-        ),
-        segments=[rows.part(thinned(time_s, part)) for part in chosen],
-    )
+    loop = replace(ardupilot_loop_of(recording, {**given, _LEARNED: hover}), row_s=None)
+    segments = [rows.part(thinned(time_s, part)) for part in chosen]
+    if "desired_climb_rate_m_s" not in recording.columns:
+        segments = [_TuningSegment.of(each, loop) for each in segments]
+    return LoggedFlight(loop=loop, segments=segments)
 
 
-def has_newer_names(recording: Recording) -> bool:
-    """Whether the vehicle's parameters have the names of release 4.7."""
-    return any(each.name in NEWER_NAMES for each in recording.settings)
+def ardupilot_loop_of(recording: Recording, given: Mapping[str, float]) -> ArduPilotLoop:
+    """The loop of a recording with these parameters, by the names of releases 4.0 to 4.6. Raises InputError for one
+    that the replica lacks, or that is outside its range."""
+    is_tuning = "altitude_m" in recording.columns and recording.columns["altitude_m"].source.startswith("CTUN.")
+    differentiates = is_tuning and _SINCE_4_1 not in given
+    loop = ardupilot_loop({**given, **(_CONSTANTS_UNTIL_4_0 if differentiates else {})})
+    return replace(loop, names=names_of({each.name for each in recording.settings}), differentiates=differentiates)
+
+
+class _TuningSegment(Segment):
+    """A segment of CTUN, which has no desired climb rate: what of its target does not come from the deviation. With
+    some releases and modes the altitude of the reference changes without one, and the climb rate has a bias."""
+
+    @property
+    def moves_m_s(self) -> Samples:
+        return np.gradient(self.z_d_m, self.time_s)
+
+    @property
+    def rises_m_s(self) -> Samples:
+        return self.v_m_s - np.mean(self.v_m_s - np.gradient(self.z_m, self.time_s))
+
+    @classmethod
+    def of(cls, rows: Segment, loop: ArduPilotLoop) -> "_TuningSegment":
+        """The rows under this loop."""
+        from_deviation = climb_rate_targets(loop.parameters, rows.z_d_m - rows.z_m, np.zeros_like(rows.z_m))
+        v_d_m_s = rows.v_t_m_s - from_deviation
+        derived = {"v_d_m_s": v_d_m_s, "a_d_m_s2": np.gradient(v_d_m_s, rows.time_s)}
+        return cls(**{each.name: getattr(rows, each.name) for each in fields(rows)} | derived)
 
 
 def _rows(recording: Recording, lean: Samples, throttle: Sequence[Samples]) -> Segment:
     """All rows of the loop. A leaning vehicle demands more throttle by the cosine of its lean, so the share of it that
     carries is given."""
     columns, (demanded, sent, hover) = recording.columns, throttle
+    time_s = columns["altitude_m"].time_s
+
+    def beside(name: str, differentiated: Samples | None = None) -> Samples:
+        """A column; if it was not logged, the slope of another one."""
+        if name in columns or differentiated is None:
+            return columns[name].beside(time_s)
+        return np.gradient(differentiated, time_s) if len(time_s) > 1 else np.zeros(1)
+
+    z_d_m = beside("desired_altitude_m" if "desired_altitude_m" in columns else "reference_m")
+    v_d_m_s = beside("desired_climb_rate_m_s", z_d_m)
     return Segment(
-        time_s=columns["altitude_m"].time_s,
-        z_m=columns["altitude_m"].values,
-        v_m_s=columns["climb_rate_m_s"].values,
-        a_m_s2=columns["acceleration_m_s2"].values,
-        z_d_m=columns["desired_altitude_m" if "desired_altitude_m" in columns else "reference_m"].values,
-        v_d_m_s=columns["desired_climb_rate_m_s"].values,
-        a_d_m_s2=columns["desired_acceleration_m_s2"].values,
-        v_t_m_s=columns["climb_rate_target_m_s"].values,
+        time_s=time_s,
+        z_m=beside("altitude_m"),
+        v_m_s=beside("climb_rate_m_s"),
+        a_m_s2=beside("acceleration_m_s2"),
+        z_d_m=z_d_m,
+        v_d_m_s=v_d_m_s,
+        a_d_m_s2=beside("desired_acceleration_m_s2", v_d_m_s),
+        v_t_m_s=beside("climb_rate_target_m_s"),
         throttle=demanded,
         throttle_filtered=sent * lean,
         assumed_hover=hover,
@@ -156,26 +194,15 @@ def _is_reset(rows: Segment) -> Rows:
         | jump(rows.z_m, rows.v_m_s, _JUMP_M)
         | jump(rows.z_d_m, rows.v_d_m_s, _JUMP_M)
         | jump(rows.v_m_s, rows.a_m_s2, _JUMP_M_S)
+        | jump(rows.v_t_m_s, rows.a_d_m_s2, _JUMP_M_S)
     )
 
 
-def _in_flight(recording: Recording, time_s: Samples) -> Rows:
-    """Rows between takeoff and landing, by the vehicle's own events. Where none tells whether it flew, as in a log that
-    begins in the air, those well above the lowest altitude, which is 0 or less, and with thrust."""
-    altitude_m, thrust = recording.columns["altitude_m"].values, recording.at("thrust", time_s)
-    lowest_m = np.min(altitude_m[np.isfinite(altitude_m)], initial=0.0)
-    is_up = (altitude_m > lowest_m + _ABOVE_GROUND_M) & (thrust > 0.0)
-    flying, unknown_from_s = is_up, -np.inf
-    for event in recording.events_of(*_TELLING):
-        if event.kind in (EventKind.MOTORS_ON, EventKind.LIFT_OFF):
-            flying = flying & (time_s < unknown_from_s)
-        if event.kind is EventKind.LIFT_OFF:
-            flying = flying | (time_s >= event.time_s + _AFTER_TAKEOFF_S)
-        else:
-            flying = flying & (time_s < event.time_s - _BEFORE_LANDING_S)
-        unknown_from_s = event.time_s if event.kind is EventKind.BOOT else np.inf
-        flying = flying | (is_up & (time_s >= unknown_from_s))
-    return flying
+def _in_flight(recording: Recording) -> Rows:
+    """Rows between takeoff and landing, and not near them."""
+    altitude = recording.columns["altitude_m"]
+    thrust = recording.at("thrust", altitude.time_s)
+    return in_flight(recording, altitude.values, thrust, after_s=_AFTER_TAKEOFF_S, before_s=_BEFORE_LANDING_S)
 
 
 def _holds_altitude(recording: Recording, time_s: Samples) -> Rows:
@@ -199,32 +226,37 @@ def frame_of(recording: Recording) -> str:
     return _FIRMWARES.get(recording.firmware, "")
 
 
-def _refused(recording: Recording, name: str) -> Refused:
-    hint = "Use ArduCopter's .bin log of a flight with altitude changes, with NTUN and CTUN in LOG_BITMASK."
-    return lambda reason: refusal(f"{name} cannot be analysed.", hint, [reason], recording.notes)
+def _refusal(recording: Recording, name: str, *reasons: Reason) -> TrajectoryError:
+    hint = "Use ArduCopter's .bin log of a flight with altitude changes."
+    return refusal(f"{name} cannot be analysed.", hint, reasons, recording.notes)
 
 
-def _require_messages(recording: Recording, refused: Refused) -> None:
+def _require_messages(recording: Recording, refused: Callable[..., TrajectoryError]) -> None:
     """Require what an analysis needs, of a copter."""
     if not recording.sources:
         raise refused(Reason(code=ReasonCode.NO_DATA))
     if frame := frame_of(recording):
         raise refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
-    from_loop = {name for name, column in recording.columns.items() if not column.source.startswith("CTUN.")}
-    absent = [name for name in LOOP if name not in from_loop]
-    if len(absent) == len(LOOP):
-        raise refused(_absent(recording, "PSCD", "NTUN"))
-    if absent and absent not in _ONE_OF_TWO:
-        raise refused(Reason(code=ReasonCode.COLUMN_MISSING, field=str(LOOP[absent[0]])))
-    if not recording.columns.keys() >= set(_TUNING):
-        raise refused(_absent(recording, "CTUN", "CTUN"))
+    columns, latest = recording.columns, dict(in_older_names(each.name, each.value) for each in recording.settings)
+    loop = LOOP if _SINCE_4_1 in latest else TUNING
+    if "altitude_m" in columns:
+        loop = next(each for each in LOOPS if str(each["altitude_m"]) == columns["altitude_m"].source)
+    known = columns.keys() | (_REFERENCES if columns.keys() & _REFERENCES else set())
+    needed = {**loop, **{each: BESIDE[each] for each in (*_TUNING, "mode")}}
+    absent = [source for name, source in needed.items() if name not in known]
+    first = {source.message: source for source in reversed(absent)}
+    reasons = [_absent(recording, latest, each) for each in reversed(first.values())]
+    otherwise = [each for each in reasons if each.code is ReasonCode.COLUMN_MISSING]
+    if reasons:
+        raise refused(*(otherwise or reasons))
 
 
-def _absent(recording: Recording, message: str, bit: str) -> Reason:
-    """Why a message has no columns: its bit of LOG_BITMASK is not set, or the release logs something else."""
-    latest = {each.name: each.value for each in recording.settings}
-    would_be_logged = "LOG_BITMASK" in latest and not latest.keys() & _UNTIL_4_0
-    if would_be_logged and not int(latest["LOG_BITMASK"]) & _LOG_BITS[bit]:
-        return Reason(code=ReasonCode.LOG_BIT_UNSET, field=message, named=[bit])
-    is_logged = message in recording.sources
-    return Reason(code=ReasonCode.COLUMN_MISSING if is_logged else ReasonCode.MESSAGE_MISSING, field=message)
+def _absent(recording: Recording, latest: Mapping[str, float], source: Source) -> Reason:
+    """Why there is no such column: the release logs something else, the bit of LOG_BITMASK is not set, or another
+    cause."""
+    if source.message in recording.sources:
+        return Reason(code=ReasonCode.COLUMN_MISSING, field=str(source))
+    bit, mask = _LOG_BITS.get(source.message, ("", 0))
+    if mask and "LOG_BITMASK" in latest and not int(latest["LOG_BITMASK"]) & mask:
+        return Reason(code=ReasonCode.LOG_BIT_UNSET, field=source.message, named=[bit])
+    return Reason(code=ReasonCode.MESSAGE_MISSING, field=source.message)

@@ -38,6 +38,16 @@ class Segment:
         return replace(self, **{each.name: getattr(self, each.name)[rows] for each in fields(self)})
 
     @property
+    def moves_m_s(self) -> Samples:
+        """How fast the altitude of the reference changes, shape (n,)."""
+        return self.v_d_m_s
+
+    @property
+    def rises_m_s(self) -> Samples:
+        """How fast the vehicle climbs, shape (n,), whatever bias its estimate has."""
+        return self.v_m_s
+
+    @property
     def duration_s(self) -> float:
         """Time from the first row to the last."""
         return float(self.time_s[-1] - self.time_s[0])
@@ -87,7 +97,7 @@ def interpolated(segment: Segment, step_s: float) -> Steps:
         return np.asarray(CubicHermiteSpline(segment.time_s, values, rates)(time_s))
 
     reference = (
-        between(segment.z_d_m, segment.v_d_m_s),
+        between(segment.z_d_m, segment.moves_m_s),
         between(segment.v_d_m_s, segment.a_d_m_s2),
         np.interp(time_s, segment.time_s, segment.a_d_m_s2),
         np.interp(time_s, segment.time_s, segment.assumed_hover),

@@ -184,7 +184,7 @@ def _rows(parts: Sequence[_Part], lag_s: float) -> _Rows:
     sought = np.log1p(np.maximum(rows(lambda each: each.a_m_s2) / GRAVITY_M_S2, _FREE_FALL))
     ones = np.ones(len(sought))
     sensed = [_sensed_throttle(each.segment, each.flight, lag_s)[each.segment.scored] for each in parts]
-    causes = np.column_stack([np.log(np.concatenate(sensed)), rows(lambda each: each.v_m_s), ones])
+    causes = np.column_stack([np.log(np.concatenate(sensed)), rows(lambda each: each.rises_m_s), ones])
     excited = [
         np.column_stack(
             [each.excited_v_m_s, *(_before(each.excited_a_m_s2, rows=back) for back in range(_INSTRUMENT_ROWS))]

@@ -11,6 +11,8 @@ from app.core.reasons import Reason, ReasonCode
 PLAUSIBLE: Final = (0.0, 1e6)
 """No parameter of a vehicle's loop comes near the upper end; far beyond it, the replica's numbers overflow."""
 
+_NOT_POSITIVE: Final = ReasonCode.PARAMETER_NOT_POSITIVE.key
+
 
 @dataclass(frozen=True, slots=True)
 class _Described:
@@ -35,7 +37,7 @@ class ReplicaParameters:
 
     def __post_init__(self) -> None:
         _require(
-            Problem(each.name, "must be positive" if each.positive else "must be at least 0")
+            Problem(each.name, f"must be {'positive' if each.positive else 'at least 0'}", code=_NOT_POSITIVE)
             for each, value in zip(self._described().values(), self.values, strict=True)
             if not (0.0 <= value < math.inf) or (each.positive and not value)
         )

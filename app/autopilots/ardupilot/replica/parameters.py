@@ -1,7 +1,7 @@
 """Parameters of ArduCopter's vertical loop, with the firmware's names."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -102,6 +102,18 @@ SINCE_4_7: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
 )
 """Names until release 4.6, each with the later name and the factor from the old value to the new."""
 
+_OTHER_NAMES: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
+    {
+        "POS_Z_P": ("PSC_POSZ_P", 1.0),
+        "VEL_Z_P": ("PSC_VELZ_P", 1.0),
+        **{f"ACCEL_Z_{each}": (f"PSC_ACCZ_{each}", 1.0) for each in ("P", "I", "D", "FF", "IMAX")},
+        **dict.fromkeys(("ACCEL_Z_FILT_HZ", "ACCEL_Z_FILT", "PSC_ACCZ_FILT"), ("PSC_ACCZ_FLTE", 1.0)),
+        **NEWER_NAMES,
+    }
+)
+"""All names beside those of releases 4.0 to 4.6: of 3.3 to 3.5, of 3.6, and since 4.7. Gains before 3.3 (THR_ACCEL_P)
+are those of another controller."""
+
 LOOP_RATE: Final = "SCHED_LOOP_RATE"
 ACCELEROMETER_FILTER: Final = "INS_ACCEL_FILTER"
 LOOP_RATE_HZ: Final = 400.0
@@ -117,14 +129,23 @@ _SINGLE_PRECISION_DIGITS: Final = 7
 
 
 def in_older_names(name: str, value: float) -> tuple[str, float]:
-    """A parameter by the name and in the unit that it had until release 4.6; unchanged if it was not renamed."""
-    older, factor = NEWER_NAMES.get(name, (name, 1.0))
+    """A parameter by the name and in the unit that it had in releases 4.0 to 4.6; unchanged if it was not renamed."""
+    older, factor = _OTHER_NAMES.get(name, (name, 1.0))
     return older, _scaled(value, factor)
 
 
-def in_newer_names(values: Mapping[str, float]) -> dict[str, float]:
-    """Parameters by the names and in the units that they have since release 4.7; unchanged if they were not renamed."""
-    renamed = ((*SINCE_4_7.get(name, (name, 1.0)), value) for name, value in values.items())
+def names_of(own: Collection[str]) -> dict[str, tuple[str, float]]:
+    """Names of releases 4.0 to 4.6 for which a vehicle whose parameters have its `own` names has another one, with
+    that and the factor to its value: those of 4.7 for all, if it has any of them."""
+    renamed = ((_OTHER_NAMES[each], each) for each in own if each in _OTHER_NAMES)
+    since_4_7 = SINCE_4_7 if NEWER_NAMES.keys() & own else {}
+    return {**since_4_7, **{name: (each, 1.0 / factor) for (name, factor), each in renamed}}
+
+
+def in_newer_names(values: Mapping[str, float], names: Mapping[str, tuple[str, float]] = SINCE_4_7) -> dict[str, float]:
+    """Parameters by the names and in the units that they have since release 4.7, or by other `names`; unchanged if they
+    were not renamed."""
+    renamed = ((*names.get(name, (name, 1.0)), value) for name, value in values.items())
     return {name: _scaled(value, factor) for name, factor, value in renamed}
 
 

@@ -34,8 +34,8 @@ THROTTLE_FILTER_HZ: Final = 2.0
     POSITION_P, VELOCITY_P, VELOCITY_I, VELOCITY_D, VELOCITY_FF, VELOCITY_IMAX, VELOCITY_ERROR_GAIN,
     VELOCITY_DERIVATIVE_GAIN, ACCELERATION_P, ACCELERATION_I, ACCELERATION_D, ACCELERATION_FF, ACCELERATION_D_FF,
     ACCELERATION_IMAX, TARGET_GAIN, ACCELERATION_ERROR_GAIN, ACCELERATION_DERIVATIVE_GAIN, JERK, CLIMB, DESCENT,
-    ACCELERATION, HOVER, RAMP_STEP, RAMP_END, DT, THROTTLE_GAIN, RELAXATION_GAIN,
-) = range(27)  # fmt: skip
+    ACCELERATION, HOVER, RAMP_STEP, RAMP_END, DT, THROTTLE_GAIN, RELAXATION_GAIN, DIFFERENTIATES,
+) = range(28)  # fmt: skip
 """Indices in the packed parameters: of the fields of `Parameters`, in their order, then of what follows from the step
 alone."""
 
@@ -72,9 +72,11 @@ _RAMP_END_ACCELERATION: Final = 0.5
 _RAMP_END_CLIMB: Final = 0.1
 
 
-def packed(parameters: Parameters, dt_s: float = STEP_S) -> Packed:
-    """Constants of a step of `dt_s`, shape (27,), for the kernels."""
+def packed(parameters: Parameters, dt_s: float = STEP_S, *, differentiates: bool = False) -> Packed:
+    """Constants of a step of `dt_s`, shape (28,), for the kernels. A loop that `differentiates` is that of releases 3.3
+    to 4.0: the change of the climb rate target is in place of the desired acceleration."""
     p = [*parameters.values, dt_s, low_pass_gain(THROTTLE_FILTER_HZ, dt_s), dt_s / (dt_s + _RELAXATION_S)]
+    p.append(float(differentiates))
     for place in _FILTERS:
         p[place] = low_pass_gain(p[place], dt_s)
     p[JERK] = parameters.shaping_jerk_m_s3
@@ -210,12 +212,14 @@ def _bump(state: State, p: Packed, a: float) -> float:
 @kernel
 def _control_position(state: State, p: Packed, z: float) -> None:
     """Sets the climb rate target; a desired altitude further away than its limit is pulled along."""
-    error = state[Z_D] - z
+    error, before = state[Z_D] - z, state[V_T]
     limited = clip(error, state[POSITION_ERROR_MIN], state[POSITION_ERROR_MAX])
     if limited != error:
         state[Z_D] = z + limited
     state[POSITION_ERROR] = limited
     state[V_T] = square_root(limited, p[POSITION_P], p[ACCELERATION], 0.0) + state[V_D]
+    if p[DIFFERENTIATES] > 0.0:
+        state[A_D] = (state[V_T] - before) / p[DT] if state[RESET] == 0.0 else 0.0
 
 
 @kernel

@@ -7,6 +7,7 @@ from app.autopilots.ardupilot.replica.parameters import (
     in_newer_names,
     in_older_names,
     low_pass_gain,
+    names_of,
     parameters_from,
 )
 from app.autopilots.ardupilot.replica.vertical import ACCELERATION_IMAX, HOVER, RAMP_END, THROTTLE_GAIN, packed
@@ -40,6 +41,28 @@ def test_release_4_7_renamed_parameters_and_changed_their_units(
     newer: tuple[str, float], older: tuple[str, float]
 ) -> None:
     assert in_older_names(*newer) == older
+
+
+@pytest.mark.parametrize(
+    ("earlier", "name"),
+    [
+        ("POS_Z_P", "PSC_POSZ_P"),
+        ("VEL_Z_P", "PSC_VELZ_P"),
+        ("ACCEL_Z_I", "PSC_ACCZ_I"),
+        ("ACCEL_Z_FILT_HZ", "PSC_ACCZ_FLTE"),
+        ("PSC_ACCZ_FILT", "PSC_ACCZ_FLTE"),
+        ("THR_ACCEL_P", "THR_ACCEL_P"),
+    ],
+)
+def test_names_before_4_0_are_read_and_those_of_another_controller_are_not(earlier: str, name: str) -> None:
+    assert in_older_names(earlier, 0.4) == (name, 0.4)
+
+
+def test_gains_are_written_by_the_names_that_the_vehicle_has() -> None:
+    gains = {"PSC_POSZ_P": 3.0, "PSC_ACCZ_P": 0.854}
+    assert in_newer_names(gains, names_of(["POS_Z_P", "ACCEL_Z_P", "FRAME"])) == {"POS_Z_P": 3.0, "ACCEL_Z_P": 0.854}
+    assert in_newer_names(gains, names_of(["PSC_POSZ_P", "PSC_ACCZ_P", "PSC_ACCZ_FILT"])) == gains
+    assert in_newer_names(gains, names_of(["PSC_D_POS_P"])) == in_newer_names(gains)
 
 
 def test_gains_are_written_by_the_names_and_in_the_units_of_release_4_7() -> None:
