@@ -92,7 +92,7 @@ READERS: Final[Mapping[Format, Reader]] = {
         title="MAVLink telemetry log",
         read=_alone(read_tlog),
         flight=copter_steps,
-        altitude="no LOCAL_POSITION_NED of the vehicle",
+        altitude="neither LOCAL_POSITION_NED nor GLOBAL_POSITION_INT of the vehicle",
         hint=TLOG_HINT,
     ),
     Format.DATAFLASH: _ARDUPILOT,
