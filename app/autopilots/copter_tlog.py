@@ -16,7 +16,7 @@ from app.autopilots.ardupilot.experiments import ArduPilotLoop, read_ardupilot
 from app.autopilots.ardupilot.log import MODES
 from app.autopilots.ardupilot.replica import parameters as ardupilot
 from app.autopilots.ardupilot.replica.parameters import in_newer_names, in_older_names
-from app.autopilots.px4 import logged_flight as px4_flight
+from app.autopilots.frames import frame_of
 from app.autopilots.px4.experiments import Px4Loop, px4_loop, read_px4
 from app.autopilots.px4.replica import parameters as px4
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME
@@ -28,7 +28,6 @@ from app.autopilots.recording import (
     held,
 )
 from app.autopilots.segments import LARGEST_LEAN, Condition, Refused, choose_parts, jumps
-from app.autopilots.tlog import SOURCES
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.recorded_flight import LARGEST_INTERVAL_S, FlownSteps
 from app.core.analysis.segment import LEAD_S
@@ -52,13 +51,12 @@ _AT_REST_M: Final = 0.05
 class _Autopilot:
     """What differs between ArduCopter and PX4.
 
-    `frame_of` names a vehicle that is no copter. `number_of_mode` is of the custom mode in a heartbeat; `mode` is the
-    one whose set points the vehicle reports. `messages` are needed. Of the parameters, the gains in `bounds` are
-    needed, and `learned` if there is one, which the vehicle changes by itself; `kept` are all on which the loop
-    depends. `shapes_reference` if the reference is not the set point itself. `hint` says what to record.
+    `number_of_mode` is of the custom mode in a heartbeat; `mode` is the one whose set points the vehicle reports.
+    `messages` are needed. Of the parameters, the gains in `bounds` are needed, and `learned` if there is one, which the
+    vehicle changes by itself; `kept` are all on which the loop depends. `shapes_reference` if the reference is not the
+    set point itself. `hint` says what to record.
     """
 
-    frame_of: Callable[[Recording], str]
     number_of_mode: Callable[[int], int]
     mode: int
     modes: Mapping[float, str]
@@ -91,7 +89,6 @@ _MAY_LACK: Final = frozenset({*ardupilot.UNSUPPORTED, *px4.UNSUPPORTED, HOVER_RA
 _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
     {
         "ardupilot": _Autopilot(
-            frame_of=ardupilot_flight.frame_of,
             number_of_mode=lambda mode: mode,
             mode=4,
             modes=MODES,
@@ -108,7 +105,6 @@ _AUTOPILOTS: Final[Mapping[str, _Autopilot]] = MappingProxyType(
             ),
         ),
         "px4": _Autopilot(
-            frame_of=px4_flight.frame_of,
             number_of_mode=lambda mode: mode >> 16 & 0xFF,
             mode=6,
             modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
@@ -146,10 +142,7 @@ class _Reader:
     autopilot: _Autopilot
 
     def read(self) -> LoggedFlight:
-        frame = (
-            self.recording.frame if self.recording.frame in OTHER_FRAMES else self.autopilot.frame_of(self.recording)
-        )
-        if frame:
+        if (frame := frame_of(self.recording)) in OTHER_FRAMES:
             raise self._refused(Reason(code=ReasonCode.NOT_A_COPTER, named=[frame]))
         if reasons := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
             raise refusal(f"{self.name} cannot be analysed.", self.autopilot.hint, reasons, self.recording.notes)
@@ -243,7 +236,7 @@ class _Reader:
     def _sparse_messages(self) -> Iterator[Reason]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
         for message in self.autopilot.messages:
-            found = [each.time_s for name, each in self.recording.columns.items() if SOURCES[name].message == message]
+            found = [each.time_s for each in self.recording.columns.values() if each.source.startswith(f"{message}.")]
             rate_hz = self._rate_hz(found[0]) if found else 0.0
             if not found:
                 yield Reason(code=ReasonCode.MESSAGE_MISSING, field=message)

@@ -11,7 +11,7 @@ from app.autopilots.ardupilot.replica.parameters import in_older_names
 from app.autopilots.px4.experiments import px4_loop
 from app.autopilots.px4.logged_flight import LEFT_OUT_MODES, has_thrust_gains
 from app.autopilots.px4.replica.parameters import in_accelerations
-from app.autopilots.recording import EventKind, Recording
+from app.autopilots.recording import EventKind, Recording, held
 from app.autopilots.segments import find_landings, in_flight, within_limits
 from app.core.analysis.description import LONGEST_GAP_S, FlightSignals
 from app.core.analysis.loop import AltitudeLoop
@@ -38,7 +38,7 @@ def signals_of(recording: Recording) -> FlightSignals | None:
     biased = biased[np.isfinite(biased)]
     climb_rate_m_s = climb_rate_m_s - np.median(biased) if biased.size else slope_m_s
     reference_m = _known(recording, _REFERENCES, time_s)
-    if "reference_error_m" in recording.columns:
+    if "reference_error_m" in recording.columns and np.ptp(recording.columns["reference_error_m"].values) > 0.0:
         reference_m = altitude_m + _known(recording, ("reference_error_m",), time_s)
     mode = recording.at("mode", time_s)
     holds = np.isin(mode, HOLDS_ALTITUDE) if recording.autopilot.name == "ardupilot" else ~np.isin(mode, LEFT_OUT_MODES)
@@ -87,7 +87,7 @@ def _known(recording: Recording, names: Sequence[str], time_s: Samples) -> Sampl
         return np.full(len(time_s), np.nan)
     at_s = column.time_s
     nearest_s = at_s[np.searchsorted(0.5 * (at_s[1:] + at_s[:-1]), time_s)]
-    values = column.at(time_s)
+    values = column.at(time_s) if column.holds_s is None else held(at_s, column.values, time_s)
     return np.where((np.abs(time_s - nearest_s) <= LONGEST_GAP_S) & (np.abs(values) <= _LARGEST), values, np.nan)
 
 

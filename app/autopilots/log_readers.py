@@ -11,6 +11,7 @@ import numpy as np
 from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.logged_flight import ardupilot_flight
 from app.autopilots.copter_tlog import copter_steps
+from app.autopilots.frames import frame_of
 from app.autopilots.paparazzi.log import HINT as PAPARAZZI_HINT
 from app.autopilots.paparazzi.log import read_paparazzi
 from app.autopilots.px4.log import read_px4
@@ -21,6 +22,7 @@ from app.autopilots.tlog import read_tlog
 from app.autopilots.tlog_vehicles import HINT as TLOG_HINT
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, Problem, TrajectoryError
+from app.core.reasons import OTHER_FRAMES
 from app.logs.base import refused
 from app.logs.formats import NEVER_WRITTEN, Format, head_of, recognise
 from app.logs.takeoff_csv import read_takeoff_csv
@@ -61,17 +63,17 @@ class Reader:
             raise refused(f"has no vehicle {system}, only {there}", "Choose one of these.", field="vehicle")
         return chosen[0] if len(chosen) == 1 else max(chosen, key=lambda each: self._to_learn(each, name))
 
-    def _to_learn(self, recording: Recording, name: str) -> tuple[bool, float]:
-        """Whether the vehicle's flight can be analysed, and by how much it moves."""
+    def _to_learn(self, recording: Recording, name: str) -> tuple[bool, bool, float]:
+        """Whether the vehicle's flight can be analysed, whether it may be a copter, and by how much it moves."""
         altitude = recording.columns.get("altitude_m")
         moves_m = 0.0 if altitude is None else float(np.ptp(np.nan_to_num(altitude.values)))
         try:
             flown = self.flown(recording, name)
         except InputError:
-            return False, moves_m
+            return False, frame_of(recording) not in OTHER_FRAMES, moves_m
         if isinstance(flown, LoggedFlight):
             moves_m = float(sum(np.ptp(each.z_d_m) for each in flown.segments))
-        return True, moves_m
+        return True, True, moves_m
 
 
 def _alone(read: Callable[[BinaryIO], Recording]) -> Callable[[BinaryIO, BinaryIO | None], Recording]:
@@ -92,7 +94,7 @@ READERS: Final[Mapping[Format, Reader]] = {
         title="MAVLink telemetry log",
         read=_alone(read_tlog),
         flight=copter_steps,
-        altitude="no LOCAL_POSITION_NED of the vehicle",
+        altitude="neither LOCAL_POSITION_NED nor GLOBAL_POSITION_INT of the vehicle",
         hint=TLOG_HINT,
     ),
     Format.DATAFLASH: _ARDUPILOT,

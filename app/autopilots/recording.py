@@ -226,6 +226,18 @@ class Recording:
         return ParameterHistory.of((each.time_s, each.name, each.value) for each in self.settings if each.name in names)
 
 
+def release_of(packed: int) -> str:
+    """The version of a firmware in four bytes, as "1.15.1" or "1.13.0-dev"; empty if they are none."""
+    *version, stage = packed.to_bytes(4, "big")
+    is_release = 0 < version[0] <= _LARGEST_MAJOR and stage in _STAGES
+    return ".".join(map(str, version)) + _STAGES[stage] if is_release else ""
+
+
+_STAGES: Final[Mapping[int, str]] = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+"""By the last byte of a release."""
+_LARGEST_MAJOR: Final = 9
+
+
 def refusal(happened: str, hint: str, notes: Sequence[str] = (), error: type[InputError] = TrajectoryError) -> Refused:
     """Errors of a log in which this happened, with `notes` after each reason."""
     return lambda field, reason: error(happened, hint=hint, problems=(Problem(field, "; ".join((reason, *notes))),))

@@ -27,6 +27,7 @@ from app.autopilots.recording import (
     Source,
     Span,
     columns_of,
+    release_of,
     restarts,
     spans_of,
 )
@@ -49,9 +50,15 @@ SOURCES: Final[Mapping[str, Source]] = {
 }
 """`lean` is the cosine of the demanded lean, `reference_error_m` how far the vehicle's own reference is above it; the
 target is NaN where the vehicle flies to none, or was given a speed or an acceleration beside it."""
+_ABOVE_HOME: Final[Mapping[str, Source]] = {
+    "altitude_m": Source("GLOBAL_POSITION_INT", "relative_alt", 1e-3),
+    "climb_rate_m_s": Source("GLOBAL_POSITION_INT", "vz", -1e-2),
+}
+"""In place of those in the vehicle's own frame, of one that does not report its position in it: targets in it have
+another datum."""
+_REPORTED: Final = (*SOURCES.values(), *_ABOVE_HOME.values())
 _FIELDS: Final = {
-    each.message: [source.field for source in SOURCES.values() if source.message == each.message]
-    for each in SOURCES.values()
+    each.message: [source.field for source in _REPORTED if source.message == each.message] for each in _REPORTED
 }
 """Of each message that is reported."""
 _TIME: Final = "time_s"
@@ -152,6 +159,7 @@ class _Decoder:
     _arming: list[tuple[float, bool]] = field(default_factory=list)
     _heard_s: float = -np.inf
     _mode: int | None = None
+    _release: str = ""
     _is_fed: bool = False
     """Whether the last position target for it has more than a position, which it does not report."""
 
@@ -168,14 +176,16 @@ class _Decoder:
             what = f"the block {name}" if name else f"block {number}"
             self._events.append(Event(EventKind.TAKEOFF if takes_off else EventKind.COMMAND, time_s, what))
         tables = {name: _table(name, values) for name, values in self._reports.items()}
+        sources = SOURCES if self.vehicle.has_own_frame else {**SOURCES, **_ABOVE_HOME}
         return Recording(
-            title=f"MAVLink log of {autopilot.project or autopilot.title}",
+            title=f"MAVLink log of {autopilot.project or autopilot.title}, altitude from {sources['altitude_m']}",
             autopilot=autopilot,
             system=self.vehicle.system,
+            release=self._release,
             frame=self.vehicle.frame,
             started_at=self._clock.started_at,
             heard_s=self._clock.first_heard_s,
-            columns=columns_of(tables, SOURCES, clock=_TIME, ticks_per_s=1.0),
+            columns=columns_of(tables, sources, clock=_TIME, ticks_per_s=1.0),
             sources=list(tables),
             settings=self._settings,
             has_all_parameters=0 < self._parameters <= len(self._known),
@@ -205,10 +215,11 @@ class _Decoder:
         return f"another vehicle in the log, system {other.vehicle.system} under {project}{same}"
 
     def _report(self, message: Message, *values: float) -> None:
-        """Take a report, dated by its own time, or else by the last one."""
+        """Take a report, dated by its own time, or else by the last one; before the first time, states alone."""
         has_time = "time_boot_ms" in message.fields
         time_s = self._clock.at(message["time_boot_ms"], message.stamp_s) if has_time else self._clock.now_s
-        self._reports[message.name].extend((time_s, *values))
+        if np.isfinite(time_s) or message.name == "HEARTBEAT":
+            self._reports[message.name].extend((time_s, *values))
 
     def _heartbeat(self, message: Message) -> None:
         if not self.vehicle.sends(message):
@@ -239,16 +250,23 @@ class _Decoder:
         self._report(message, thrust if 0.0 <= thrust <= 1.0 else np.nan, lean)
 
     def _position_target(self, message: Message) -> None:
-        is_unknown = self._is_fed or int(message["type_mask"]) & _IGNORES_Z
+        is_unknown = self._is_fed or int(message["type_mask"]) & _IGNORES_Z or not self.vehicle.has_own_frame
         self._report(message, np.nan if is_unknown else message["z"])
 
+    def _position_above_home(self, message: Message) -> None:
+        if not self.vehicle.has_own_frame:
+            self._as_it_is(message)
+
     def _battery(self, message: Message) -> None:
-        if 0 < message["voltage_battery"] < 0xFFFF and np.isfinite(self._clock.now_s):
+        if 0 < message["voltage_battery"] < 0xFFFF:
             self._report(message, message["voltage_battery"] / 1000)
 
     def _throttle(self, message: Message) -> None:
-        if 0 <= message["throttle"] <= 100 and np.isfinite(self._clock.now_s):
+        if 0 <= message["throttle"] <= 100:
             self._report(message, message["throttle"] / 100)
+
+    def _version(self, message: Message) -> None:
+        self._release = release_of(int(message["flight_sw_version"])) or self._release
 
     def _parameter(self, message: Message) -> None:
         bytewise = self.vehicle.autopilot.sends_integers_bytewise and int(message["param_type"]) in _INTEGERS
@@ -328,11 +346,13 @@ _Handlers = Mapping[str, Callable[[_Decoder, Message], None]]
 _REPORTS: Final[_Handlers] = {
     "HEARTBEAT": _Decoder._heartbeat,
     "LOCAL_POSITION_NED": _Decoder._as_it_is,
+    "GLOBAL_POSITION_INT": _Decoder._position_above_home,
     "ATTITUDE_TARGET": _Decoder._attitude_target,
     "POSITION_TARGET_LOCAL_NED": _Decoder._position_target,
     "NAV_CONTROLLER_OUTPUT": _Decoder._as_it_is,
     "SYS_STATUS": _Decoder._battery,
     "VFR_HUD": _Decoder._throttle,
+    "AUTOPILOT_VERSION": _Decoder._version,
     "PARAM_VALUE": _Decoder._parameter,
     "COMMAND_ACK": _Decoder._answer,
     "SCRIPT_ITEM": _Decoder._block,

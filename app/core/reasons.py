@@ -113,13 +113,14 @@ def _balanced(numbers: Mapping[str, float]) -> str:
 
 LEFT_OUT: Final = "left_out_by_"
 """Begins the names of seconds that a filter leaves out, before its code."""
+UNNAMED_FRAME: Final = "other"
 OTHER_FRAMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "VTOL": "a VTOL",
         "airship": "an airship",
         "boat": "a boat",
         "helicopter": "a helicopter",
-        "other": "a vehicle of another kind",
+        UNNAMED_FRAME: "a vehicle of another kind",
         "plane": "a plane",
         "rover": "a rover",
         "submarine": "a submarine",

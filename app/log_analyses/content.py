@@ -3,10 +3,12 @@
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from typing import Final, Generic, TypeVar
 
 from app.autopilots.autopilot import Autopilot
 from app.autopilots.described import loop_of, signals_of
+from app.autopilots.frames import frame_of
 from app.autopilots.log_readers import Reader, reader_of
 from app.autopilots.recording import Recording
 from app.autopilots.replica_check import LoopReplica, ReplicaCheck
@@ -19,7 +21,7 @@ from app.core.analysis.hand_rules import UsualMargins, usual_margins
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.formatting import capitalised
-from app.core.reasons import ReasonCode
+from app.core.reasons import UNNAMED_FRAME, ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_analyses import descriptions, manoeuvres, replicas, takeoffs
@@ -41,25 +43,25 @@ _OTHER_FILES: Final[Mapping[Format | None, str]] = {
 _Answer = TypeVar("_Answer", TuningAnswer, ReplicaAnswer, Refusal)
 
 
-def _decoded(
-    content: bytes, companion: bytes | None, name: str, vehicle: int | None = None
-) -> tuple[Reader, Recording]:
-    """The reader of a log, and the recording of the vehicle with this system id, or the one with the most to learn."""
+def _decoded(content: bytes, companion: bytes | None, name: str) -> tuple[Reader, Recording]:
+    """The reader of a log, and the recording of all its vehicles."""
     head = content[:HEAD_BYTES]
     reader = reader_of(head)
     if reader is None:
         what = _OTHER_FILES.get(recognise(head), "is not a log") if head else "is empty"
         hint = f"Use {ANALYSED}, or a trace of the vertical loop with one row per step, .csv or .csv.gz."
         raise TrajectoryError(f"{name} cannot be used.", hint=hint, problems=(Problem("file", what),))
-    recording = reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
-    return reader, reader.vehicle(recording, name, vehicle)
+    return reader, reader.read(io.BytesIO(content), None if companion is None else io.BytesIO(companion))
 
 
-def read_start(content: bytes, companion: bytes | None, name: str) -> Sequence[Takeoff] | Definition:
+def read_start(
+    content: bytes, companion: bytes | None, name: str, vehicle: int | None = None
+) -> Sequence[Takeoff] | Definition:
     """Read what a campaign starts with: the takeoffs of a Paparazzi log, or its definition with the gains proposed from
-    a copter's, which takes some seconds. Raises InputError that names what is missing or wrong."""
-    reader, recording = _decoded(content, companion, name)
-    flown = reader.flown(recording, name)
+    a copter's, which takes some seconds; of the `vehicle` as for `analyze_content`. Raises InputError that names what
+    is missing or wrong."""
+    reader, logged = _decoded(content, companion, name)
+    flown = reader.flown(reader.vehicle(logged, name, vehicle), name)
     return manoeuvres.start_of(analyze(flown), name) if isinstance(flown, LoggedFlight) else flown
 
 
@@ -72,14 +74,20 @@ def analyze_content(
     by default that with the most to learn. Raises InputError that names what is wrong with a file that cannot be read;
     what a log lacks is in its answer.
     """
-    autopilot, release, frame = traced(content[:HEAD_BYTES]), "", ""
+    autopilot, release, frame, system = traced(content[:HEAD_BYTES]), "", "", None
+    vehicles: dict[int, str] = {}
     replica: _Answered[ReplicaAnswer] | _Answered[Refusal]
     if autopilot is None:
-        reader, recording = _decoded(content, companion, name, vehicle)
-        autopilot, release, frame = recording.autopilot, recording.release, recording.frame
+        reader, logged = _decoded(content, companion, name)
+        recording = reader.vehicle(logged, name, vehicle)
+        autopilot, release, frame = recording.autopilot, recording.release, frame_of(recording)
+        if logged.others:
+            system, together = recording.system, (logged, *logged.others)
+            vehicles = {each.system: each.autopilot.title for each in sorted(together, key=attrgetter("system"))}
         tuning = _tuning(reader, recording, name)
-        frame = frame or "".join(each.named[0] for each in tuning.answer.reasons if each.code == _OTHER_KIND)
-        replica = _compared(recording, name, gains)
+        is_other_kind = any(each.code == _OTHER_KIND for each in tuning.answer.reasons)
+        refused = _Answered(Refusal(reasons=tuning.answer.reasons), tuning.texts)
+        replica = refused if is_other_kind else _compared(recording, name, gains)
     else:
         hint = f"For better gains use {ANALYSED}."
         why = InputError(f"{name} is a trace of the loop, not the log of a flight.", hint=hint)
@@ -89,7 +97,9 @@ def analyze_content(
         file_name=name,
         autopilot=autopilot.title,
         release=release or None,
-        frame=frame or None,
+        frame=None if frame == UNNAMED_FRAME else frame or None,
+        vehicle=system,
+        vehicles=vehicles,
         tuning=tuning.answer,
         replica=replica.answer,
         texts=Texts(tuning=tuning.texts, replica=replica.texts),

@@ -11,11 +11,12 @@ from app.log_analyses.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
 FlownGains = Annotated[str, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")]
+LoggedVehicle = Annotated[int | None, Query(ge=0, le=255, description="system id, if a log has several vehicles")]
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 
 
 @router.post("", openapi_extra=REQUEST_BODY)
-def analyze_log(record: Record, gains: FlownGains = "") -> LogAnalysis:
+def analyze_log(record: Record, gains: FlownGains = "", vehicle: LoggedVehicle = None) -> LogAnalysis:
     """Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains; and how well the replica of
     the autopilot's vertical loop explains it. Where only one of both is possible, the other says why not.
 
@@ -23,7 +24,9 @@ def analyze_log(record: Record, gains: FlownGains = "") -> LogAnalysis:
     Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m; or a trace of the
     vertical loop with a row for every step, .csv or .csv.gz. Takes some seconds; nothing is stored.
     """
-    return service.analyze_upload(record.content(), record.read_companion(), name=record.name, gains=gains)
+    return service.analyze_upload(
+        record.content(), record.read_companion(), name=record.name, gains=gains, vehicle=vehicle
+    )
 
 
 @router.get("/example")
@@ -34,7 +37,10 @@ def get_example_analysis() -> LogAnalysis:
 
 @router.post("/campaign", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
 def start_campaign(
-    record: Record, asking: RequestContextDep, vehicle: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None
+    record: Record,
+    asking: RequestContextDep,
+    vehicle: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None,
+    logged_vehicle: LoggedVehicle = None,
 ) -> Campaign:
     """Create the campaign of a log.
 
@@ -44,5 +50,5 @@ def start_campaign(
     until then.
     """
     name = uploaded_name(record.name, unnamed=service.UNNAMED)
-    found = service.read_upload(record.content(), record.read_companion(), name=name)
+    found = service.read_upload(record.content(), record.read_companion(), name=name, vehicle=logged_vehicle)
     return record.once(lambda session: service.start_campaign(session, found, asking, name=name, vehicle_id=vehicle))

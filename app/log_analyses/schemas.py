@@ -241,7 +241,9 @@ class LogAnswer(Schema):
     file_name: str
     autopilot: Annotated[str, Field(description="its title")]
     release: Annotated[str | None, Field(description="of the firmware; null: not in the log")]
-    frame: Annotated[str | None, Field(description="of the vehicle; null: not in the log")]
+    frame: Annotated[str | None, Field(description="of the vehicle; null: not in the log, or of no named kind")]
+    vehicle: Annotated[int | None, Field(description="system id of the one analysed, if the log has several")]
+    vehicles: Annotated[dict[int, str], Field(description="titles of the autopilots of several, by system id")]
     tuning: TuningAnswer
     replica: ReplicaAnswer | Refusal
     texts: Texts

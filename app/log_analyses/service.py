@@ -33,15 +33,17 @@ _FURTHER_FLIGHTS: Final = 6
 _ANY_RECORD: Final = Accepted(confirm=True, invalid=True)
 
 
-def analyze_upload(content: bytes, companion: bytes | None, *, name: str, gains: str = "") -> LogAnalysis:
+def analyze_upload(
+    content: bytes, companion: bytes | None, *, name: str, gains: str = "", vehicle: int | None = None
+) -> LogAnalysis:
     """Analyse an uploaded log or trace in a process with limits. `companion` is the .log file of Paparazzi's .data
-    file, `gains` those flown, if no log contains them.
+    file, `gains` those flown, if no log contains them, `vehicle` the system id of one of several vehicles.
 
     Raises InputError that names what is missing or wrong.
     """
     from app.log_analyses.content import analyze_content  # noqa: PLC0415 - imports every reader and model
 
-    answer, plots = run_limited(FILE, analyze_content, content, companion, name, gains)
+    answer, plots = run_limited(FILE, analyze_content, content, companion, name, gains, vehicle)
     figures = {
         theme: {
             part: [card_of(PanelsFigure(plot, theme_name=theme)) for plot in drawn] for part, drawn in plots.items()
@@ -56,12 +58,14 @@ def analyze_example() -> LogAnalysis:
     return analyze_upload(RECORDED_TAKEOFF.read_bytes(), None, name=RECORDED_TAKEOFF.name)
 
 
-def read_upload(content: bytes, companion: bytes | None, *, name: str) -> Sequence[Takeoff] | Definition:
-    """Read what a campaign starts with from an uploaded log, in a process with limits. Raises InputError that names
-    what is missing or wrong."""
+def read_upload(
+    content: bytes, companion: bytes | None, *, name: str, vehicle: int | None = None
+) -> Sequence[Takeoff] | Definition:
+    """Read what a campaign starts with from an uploaded log, in a process with limits; of one of several vehicles that
+    with the system id `vehicle`. Raises InputError that names what is missing or wrong."""
     from app.log_analyses.content import read_start  # noqa: PLC0415 - imports every reader and model
 
-    return run_limited(FILE, read_start, content, companion, name)
+    return run_limited(FILE, read_start, content, companion, name, vehicle)
 
 
 def start_campaign(

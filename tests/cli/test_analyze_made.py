@@ -155,7 +155,7 @@ def test_a_log_that_lacks_something_tells_what_it_can_and_names_it(log: PoorLog,
     assert (code, "Traceback" in output) == (int(log.grade == "refused" and not is_compared), False)
     assert log.said in " ".join(output.split())
     frames = {"plane.bin": "plane", "helicopter.bin": "helicopter", "plane.ulg": "plane", "plane.tlog": "plane"}
-    assert found["frame"] == frames.get(log.name)
+    assert found["frame"] == frames.get(log.name, "quadrotor" if log.name.endswith(".tlog") else None)
     tuning = found["tuning"]
     assert (tuning["grade"], log.code in {each["code"] for each in tuning["reasons"]}) == (log.grade, True)
     assert (tuning["description"] is None, tuning["numbers"] is None) == (

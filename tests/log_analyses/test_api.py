@@ -14,6 +14,7 @@ from tests.builders import Json, get, problems_of, run_jobs
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.fleet.vehicles import register
 from tests.log_analyses.documents import require_data
+from tests.log_analyses.fleet import FLEET
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import Telemetry, recorded
 from tests.logs.written_px4 import px4_log
@@ -22,8 +23,8 @@ from tests.logs.written_tlog import Recording
 PATH = "/api/log-analyses"
 
 
-def send(client: TestClient, name: str, content: bytes) -> httpx2.Response:
-    return client.post(PATH, files={"file": (name, content)})
+def send(client: TestClient, name: str, content: bytes, **query: int) -> httpx2.Response:
+    return client.post(PATH, files={"file": (name, content)}, params=query)
 
 
 def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient) -> None:
@@ -196,8 +197,16 @@ def test_a_telemetry_log_of_a_copter_without_steps_is_refused_for_what_it_lacks(
     assert client.get("/api/campaigns").json()["items"] == []
 
 
-def start(client: TestClient, name: str, content: bytes) -> httpx2.Response:
-    return client.post(f"{PATH}/campaign", files={"file": (name, content)})
+@pytest.mark.complete
+def test_of_several_vehicles_the_one_asked_for_is_taken(client: TestClient) -> None:
+    found = send(client, "fleet.tlog", FLEET, vehicle=1).json()
+    assert (found["vehicle"], found["vehicles"]) == (1, {"1": "ArduCopter", "7": "ArduCopter"})
+    assert problems_of(send(client, "fleet.tlog", FLEET, vehicle=3)).keys() == {"vehicle"}
+    assert problems_of(start(client, "fleet.tlog", FLEET, logged_vehicle=3)).keys() == {"vehicle"}
+
+
+def start(client: TestClient, name: str, content: bytes, **query: int) -> httpx2.Response:
+    return client.post(f"{PATH}/campaign", files={"file": (name, content)}, params=query)
 
 
 def flights_of(client: TestClient, campaign: Json) -> list[Json]:

@@ -10,6 +10,7 @@ from app.autopilots.ardupilot.log import read_ardupilot
 from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.ardupilot.replica.replay import LoopLog
 from app.autopilots.ardupilot.replica_check import ardupilot_loop_log
+from app.autopilots.frames import frame_of
 from app.core.errors import InputError
 from tests.logs.recorded import OnBoardLog, recorded
 
@@ -83,19 +84,24 @@ def test_a_log_that_cannot_be_compared_is_refused_by_what_is_missing(
 
 
 @pytest.mark.parametrize(
-    ("banner", "firmware", "release"),
+    ("banner", "firmware", "release", "frame"),
     [
-        (b"ArduCopter V4.5.7 (0358a9c2)", "", "4.5.7"),
-        (b"ArduCopter V4.1.0-dev (0b517cfc)", "", "4.1.0-dev"),
-        (b"APM:Copter V3.4.4-rc1 (c0ffee00)", "", "3.4.4-rc1"),
-        (b"ArduPlane V4.5.7 (0358a9c2)", "ArduPlane", "4.5.7"),
-        (b"Frame: QUAD/X", "", ""),
+        (b"ArduCopter V4.5.7 (0358a9c2)", "", "4.5.7", ""),
+        (b"ArduCopter V4.1.0-dev (0b517cfc)", "", "4.1.0-dev", ""),
+        (b"APM:Copter V3.4.4-rc1 (c0ffee00)", "", "3.4.4-rc1", ""),
+        (b"ArduPlane V4.5.7 (0358a9c2)", "ArduPlane", "4.5.7", "plane"),
+        (b"Frame: QUAD", "", "", "QUAD"),
+        (b"Frame: QUAD/X", "", "", "QUAD/X"),
+        (b"Frame: HELI", "", "", "helicopter"),
+        (b"Framing", "", "", ""),
     ],
 )
-def test_the_firmware_and_its_release_are_those_of_the_banner(banner: bytes, firmware: str, release: str) -> None:
+def test_firmware_release_and_frame_are_those_that_it_tells(
+    banner: bytes, firmware: str, release: str, frame: str
+) -> None:
     log = OnBoardLog()
     log.define(1, "MSG", "QZ", "TimeUS,Message")
     for message in (b"RC Protocol: SITL", banner):
         log.add(1, "<Q64s", 0, message)
     found = read_ardupilot(io.BytesIO(log.content))
-    assert (found.firmware, found.release) == (firmware, release)
+    assert (found.firmware, found.release, frame_of(found)) == (firmware, release, frame)

@@ -19,6 +19,7 @@ from tests.core.analysis.flights import QUIET, simulated_flight
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.written import GUIDED, LANDED, NEWER_PARAMETERS, NOT_LANDED, PARAMETERS, STABILIZE, ardupilot_log
 from tests.logs.written_px4 import px4_log
+from tests.logs.written_tlog import GROUND_STATION
 from tests.logs.written_tlog import Recording as Telemetry
 
 
@@ -55,14 +56,16 @@ def test_an_oscillation_of_a_hover_is_found_in_its_log() -> None:
     assert found.searched_s > 35.0
 
 
-@pytest.mark.parametrize("kind", ["bin", "ulg", "tlog", "slow"])
+@pytest.mark.parametrize("kind", ["bin", "ulg", "tlog", "slow", "ground station"])
 def test_every_kind_of_log_tells_the_hover_throttle_and_the_deviation(kind: str) -> None:
-    """The simulated vehicles hover at 0.4; a slow telemetry log has four messages a second."""
+    """The simulated vehicles hover at 0.4; a slow telemetry log has four messages a second, and that of a ground
+    station which asks for the position above home alone other ones."""
     recordings = {
         "bin": lambda: copter(ardupilot_log(simulated_flight(QUIET))),
         "ulg": lambda: read_px4(io.BytesIO(px4_log(simulated_px4()))),
         "tlog": lambda: read_tlog(io.BytesIO(Telemetry().content)),
         "slow": lambda: read_tlog(io.BytesIO(replace(Telemetry(), every=12).content)),
+        "ground station": lambda: read_tlog(io.BytesIO(Telemetry(every=12, sends=GROUND_STATION).content)),
     }
     found = described(recordings[kind]())
     assert found.hover_throttle == pytest.approx(0.4, abs=0.01)

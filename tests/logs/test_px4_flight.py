@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.autopilots.frames import frame_of
 from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.logged_flight import px4_flight
@@ -203,6 +204,7 @@ def test_another_kind_of_vehicle_is_refused(options: dict[str, Any], frame: str)
         read(px4_log(flown(), **options))
     (problem,) = refused.value.problems
     assert (problem.code, [*problem.named]) == ("not_a_copter", [frame])
+    assert frame_of(read_px4(io.BytesIO(px4_log(flown(), **options)))) == frame
 
 
 def test_a_copter_by_its_airframe_is_read() -> None:

@@ -287,7 +287,7 @@ def test_a_log_without_a_vehicle_that_is_known_is_refused() -> None:
 
 
 def test_a_log_without_positions_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match="contains no LOCAL_POSITION_NED"):
+    with pytest.raises(TrajectoryError, match="contains neither LOCAL_POSITION_NED nor GLOBAL_POSITION_INT"):
         read_takeoffs(io.BytesIO(paparazzi_log().content))
 
 

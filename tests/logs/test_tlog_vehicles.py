@@ -11,6 +11,8 @@ import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega
 
+from app.autopilots.copter_tlog import copter_steps
+from app.autopilots.frames import frame_of
 from app.autopilots.log_readers import READERS, read_takeoff, read_takeoffs
 from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff
@@ -359,7 +361,16 @@ def test_what_is_no_copter_is_named_by_its_heartbeats(kind: int, frame: str) -> 
         log.fly(1.0, to_m=0.0)
     assert recording_of(log.content).frame == frame
     assert frame in OTHER_FRAMES
-    log = Telemetry(ardupilotmega, autopilot=3, system=1)
-    log.heartbeat()
-    log.fly(1.0, to_m=0.0)
-    assert recording_of(log.content).frame == ""
+
+
+@pytest.mark.parametrize(("kind", "frame"), [(2, "quadrotor"), (13, "hexarotor"), (43, ""), (0, "")])
+def test_a_copter_is_named_by_its_heartbeats_and_a_vehicle_that_does_not_tell_may_be_one(kind: int, frame: str) -> None:
+    """Seen: a vehicle of the generic kind was refused as one of another kind."""
+    flown = replace(STEPS, kind=kind)
+    assert frame_of(recording_of(flown.content)) == frame
+    assert copter_steps(recording_of(flown.content), "flight.tlog") is not None
+
+
+def test_its_parameters_tell_more_than_its_heartbeats() -> None:
+    heli = replace(STEPS, parameters={**STEPS.parameters, "H_SWASH_TYPE": 1.0})
+    assert frame_of(recording_of(heli.content)) == "helicopter"

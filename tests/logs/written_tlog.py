@@ -26,6 +26,10 @@ LOCAL_POSITION, CONTROLLER, ATTITUDE, TARGET = (
     "attitude_target",
     "position_target_local_ned",
 )
+GLOBAL_POSITION, HUD, LEAN = "global_position_int", "vfr_hud", "attitude"
+GROUND_STATION: Final = (GLOBAL_POSITION, HUD, LEAN, CONTROLLER)
+"""What many ask for, 4 of each a second."""
+HOME_M: Final = 488.0
 _AUTOPILOT: Final = {"ardupilot": 3, "px4": 12}
 _MODE: Final = {"ardupilot": GUIDED, "px4": OFFBOARD}
 PX4_PARAMETERS: Final[Mapping[str, float]] = {
@@ -86,6 +90,7 @@ class Recording:
     kind: int = 2
     every: int = 1
     without: tuple[str, ...] = ()
+    sends: tuple[str, ...] = (LOCAL_POSITION, CONTROLLER, ATTITUDE, TARGET)
     unread: tuple[str, ...] = ()
     armed: bool = True
     system: int = 1
@@ -132,13 +137,17 @@ class Recording:
         height, climb = signals.altitude_m[row], signals.climb_rate_m_s[row]
         throttle = 1.0 if signals.throttle[row] > self.full_from else signals.throttle[row]
         tilted = (np.cos(0.5 * self.lean_rad), np.sin(0.5 * self.lean_rad), 0.0, 0.0)
+        above_home = (0, 0, round(-1e2 * climb), 0)
         messages = {
             LOCAL_POSITION: (log.boot_ms, 0.0, 0.0, -height, 0.0, 0.0, -climb),
+            GLOBAL_POSITION: (log.boot_ms, 0, 0, round(1e3 * (HOME_M + height)), round(1e3 * height), *above_home),
+            HUD: (0.0, 0.0, 0, round(100 * throttle), HOME_M + height, climb),
+            LEAN: (log.boot_ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             CONTROLLER: (0.0, 0.0, 0, 0, 0, signals.reference_m[row] - height, 0.0, 0.0),
             ATTITUDE: (log.boot_ms, 0, tilted, 0.0, 0.0, 0.0, throttle),
             TARGET: (log.boot_ms, 1, 0xDF8, 0.0, 0.0, -signals.target_m[row], *[0.0] * 8),
         }
-        sent = messages.keys() - set(self.without) - ({CONTROLLER} if self.autopilot == "px4" else set())
+        sent = set(self.sends) - set(self.without) - ({CONTROLLER} if self.autopilot == "px4" else set())
         for kind in sorted(sent, reverse=True):
             log.vehicle(kind, *messages[kind])
 

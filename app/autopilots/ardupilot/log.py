@@ -107,6 +107,7 @@ _NO_CLOCK_HINT: Final = "Releases of ArduCopter before 3.1 log no time: use a lo
 _BANNER: Final = re.compile(
     rb"(APM:Copter|ArduCopter|ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V(\d[\w.-]*)"
 )
+_FRAME: Final = re.compile(rb"Frame: ([\w/-]+)")
 _COPTERS: Final = ("APM:Copter", "ArduCopter")
 
 
@@ -123,12 +124,13 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
         columns["reference_m"] = replace(found, values=np.where(found.values == 0.0, np.nan, found.values))
     columns |= {name: _until_restart(columns[name], log.boots_s) for name in _UNTIL_RESTART if name in columns}
     altitude = columns["altitude_m"].source if "altitude_m" in columns else "nothing"
-    firmware, release = _firmware(tables)
+    firmware, release = _in_messages(tables, _BANNER)
     return Recording(
         title=f"ArduPilot's on-board log, altitude from {altitude}",
         autopilot=ARDUPILOT,
-        firmware=firmware,
+        firmware="" if firmware in _COPTERS else firmware,
         release=release,
+        frame=_in_messages(tables, _FRAME)[0],
         columns=columns,
         sources=list(log.tables),
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
@@ -200,10 +202,8 @@ def _only(table: Table, columns: Collection[str], value: int) -> Table:
     return table if found is None else {name: values[found == value] for name, values in table.items()}
 
 
-def _firmware(tables: Mapping[str, Table]) -> tuple[str, str]:
-    """The firmware, if it is that of another kind of vehicle, and its release, as it tells them in a message; empty if
-    none does."""
+def _in_messages(tables: Mapping[str, Table], pattern: re.Pattern[bytes]) -> list[str]:
+    """What the first message that matches a pattern tells by its groups; empty texts if none does."""
     messages = tables.get("MSG", {}).get("Message", np.empty(0, "S64")).tolist()
-    banners = (_BANNER.match(each) for each in messages if isinstance(each, bytes))
-    name, release = next((each.groups() for each in banners if each), (b"", b""))
-    return "" if name.decode() in _COPTERS else name.decode(), release.decode()
+    matches = (pattern.match(each) for each in messages if isinstance(each, bytes))
+    return next(([text.decode() for text in each.groups()] for each in matches if each), [""] * pattern.groups)

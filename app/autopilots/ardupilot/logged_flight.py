@@ -217,9 +217,10 @@ def _landings(recording: Recording, time_s: Samples) -> Rows:
 
 
 def frame_of(recording: Recording) -> str:
-    """The kind of vehicle, by its parameters and firmware; empty if it is a copter with several rotors."""
+    """The kind of vehicle, by its parameters, frame and firmware; empty if it is a copter with several rotors."""
     latest = {each.name: each.value for each in recording.settings}
-    if any(name.startswith("H_") for name in latest) or latest.get("FRAME_CLASS") in _HELICOPTERS:
+    is_helicopter = recording.frame.startswith("HELI") or any(name.startswith("H_") for name in latest)
+    if is_helicopter or latest.get("FRAME_CLASS") in _HELICOPTERS:
         return "helicopter"
     if latest.get("Q_ENABLE"):
         return "VTOL"

@@ -19,6 +19,7 @@ from app.autopilots.recording import (
     Source,
     Span,
     columns_of,
+    release_of,
     spans_of,
 )
 from app.core.records.trajectory import Samples
@@ -88,8 +89,6 @@ AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
 """Kinds of vehicles that are no copter with several rotors, by the values of parameters."""
 
 _RELEASE: Final = "ver_sw_release"
-_STAGES: Final[Mapping[int, str]] = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
-_LARGEST_MAJOR: Final = 9
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
@@ -111,7 +110,7 @@ def read_px4(stream: BinaryIO) -> Recording:
     recording = Recording(
         title="PX4's log (ULog)",
         autopilot=PX4,
-        release=_release(tables.information.get(_RELEASE, 0)),
+        release=release_of(tables.information.get(_RELEASE, 0)),
         columns=columns,
         sources=[topic for topic, table in tables.topics.items() if len(table.get("timestamp", ()))],
         settings=[Setting(*each) for each in tables.settings],
@@ -124,12 +123,6 @@ def read_px4(stream: BinaryIO) -> Recording:
         armed=None if arming is None else _spans(arming.time_s, arming.values == ARMED),
         remarks=list(_remarks(columns)),
     )
-
-
-def _release(packed: int) -> str:
-    """The version in four bytes: "1.15.1", "1.13.0-dev"; empty if they are none."""
-    major, minor, patch, stage = packed.to_bytes(4, "big")
-    return f"{major}.{minor}.{patch}{_STAGES[stage]}" if 0 < major <= _LARGEST_MAJOR and stage in _STAGES else ""
 
 
 def _spans(time_s: Samples, holds: Rows) -> list[Span]:

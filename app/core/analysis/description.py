@@ -109,7 +109,7 @@ def _throttle_at_rest(signals: FlightSignals, flown: NDArray[np.bool_]) -> Sampl
     at_s, rates = signals.time_s[known], signals.climb_rate_m_s[known]
     before, after = (np.interp(signals.time_s + side_s, at_s, rates) for side_s in (-0.5, 0.5))
     height_m = signals.altitude_m - signals.altitude_m[flown].min()
-    off_ground = height_m > min(_OFF_GROUND_M, 0.5 * float(height_m[flown].max()))
+    off_ground = signals.flown.all() | (height_m > min(_OFF_GROUND_M, 0.5 * float(height_m[flown].max())))
     is_steady = (np.abs(signals.climb_rate_m_s) < slow_m_s) & (np.abs(after - before) < steady_m_s)
     return np.asarray(signals.throttle[flown & off_ground & is_steady & np.isfinite(signals.throttle)])
 

@@ -13,13 +13,14 @@ export const ANALYSED_FILES = ".bin,.ulg,.tlog,.data,.log,.csv,.gz,text/csv";
 interface CampaignStart {
   files: RecordFiles;
   vehicle: number | null;
+  loggedVehicle: number | null;
 }
 
 /** Create a campaign with the takeoffs of a Paparazzi log, or of a copter with the gains proposed from its log. */
 export function useStartCampaign() {
   return useMutation({
-    mutationFn: ({ files, vehicle }: CampaignStart) =>
-      answer(startCampaign({ body: { ...files }, query: { vehicle } })),
+    mutationFn: ({ files, vehicle, loggedVehicle }: CampaignStart) =>
+      answer(startCampaign({ body: { ...files }, query: { vehicle, logged_vehicle: loggedVehicle } })),
   });
 }
 
@@ -28,11 +29,13 @@ export interface AnalysedLog {
   files: RecordFiles | null;
   /** `KP,KI,KD` as flown, if the log does not contain them. */
   gains?: string;
+  /** System id of one of several vehicles; null: the one with the most to learn. */
+  vehicle?: number | null;
 }
 
 export function useAnalyzeLog() {
   return useMutation({
-    mutationFn: ({ files, gains = "" }: AnalysedLog) =>
-      answer(files === null ? getExampleAnalysis() : analyzeLog({ body: { ...files }, query: { gains } })),
+    mutationFn: ({ files, gains = "", vehicle = null }: AnalysedLog) =>
+      answer(files === null ? getExampleAnalysis() : analyzeLog({ body: { ...files }, query: { gains, vehicle } })),
   });
 }

@@ -36,7 +36,8 @@ def test_a_log_with_the_planned_gains_is_stored_and_scored(client: TestClient, t
     assert (answer.status_code, flown["state"]) == (201, "valid")
     assert flown["error"] == pytest.approx(0.3297, abs=0.00005)
     assert flown["gains"] == flown["read_back"] == TLOGS[DEFAULT]
-    assert flown["record"]["source"].startswith("MAVLink log of Paparazzi; time from the block Takeoff")
+    read = "MAVLink log of Paparazzi, altitude from LOCAL_POSITION_NED.z; time from the block Takeoff"
+    assert flown["record"]["source"].startswith(read)
 
 
 def test_a_log_of_other_gains_is_refused_naming_both_sets_and_stores_nothing(client: TestClient, trial: Json) -> None:

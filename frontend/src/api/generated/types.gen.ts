@@ -2409,9 +2409,23 @@ export type LogAnalysis = {
     /**
      * Frame
      *
-     * of the vehicle; null: not in the log
+     * of the vehicle; null: not in the log, or of no named kind
      */
     frame: string | null;
+    /**
+     * Vehicle
+     *
+     * system id of the one analysed, if the log has several
+     */
+    vehicle: number | null;
+    /**
+     * Vehicles
+     *
+     * titles of the autopilots of several, by system id
+     */
+    vehicles: {
+        [key: string]: string;
+    };
     tuning: TuningAnswer;
     /**
      * Replica
@@ -7625,6 +7639,12 @@ export type AnalyzeLogData = {
          * KP,KI,KD flown, if the log does not contain them
          */
         gains?: string;
+        /**
+         * Vehicle
+         *
+         * system id, if a log has several vehicles
+         */
+        vehicle?: number | null;
     };
     url: '/api/log-analyses';
 };
@@ -7700,6 +7720,12 @@ export type StartCampaignData = {
          * Vehicle
          */
         vehicle?: number | null;
+        /**
+         * Logged Vehicle
+         *
+         * system id, if a log has several vehicles
+         */
+        logged_vehicle?: number | null;
     };
     url: '/api/log-analyses/campaign';
 };

@@ -13,6 +13,7 @@ import { Panel } from "../../ui/Panel";
 import { bad, good, quiet, type StateLabel } from "../../ui/states";
 import { Flight } from "./Flight";
 import { GainsAsked } from "./GainsAsked";
+import { LoggedVehicles } from "./LoggedVehicles";
 import { StartCampaign } from "./StartCampaign";
 
 const FIGURE_HEIGHT_PX = 560;
@@ -32,11 +33,13 @@ interface Props {
   files: RecordFiles | null;
   /** Analyse the log again with these gains, `KP,KI,KD`. */
   onGains: (gains: string) => void;
+  /** Analyse another vehicle of the log, by its system id. */
+  onVehicle: (system: number) => void;
 }
 
 /** The answers of a log, as far as it gives them. */
-export function Analysis({ analysis, files, onGains }: Props) {
-  const { file_name, autopilot, release, frame, tuning, replica, texts, figures } = analysis;
+export function Analysis({ analysis, files, onGains, onVehicle }: Props) {
+  const { file_name, autopilot, release, frame, vehicle, vehicles, tuning, replica, texts, figures } = analysis;
   const drawn = figures[useComputedColorScheme("light")] ?? {};
   const compared = "signals" in replica;
   const betterGains = compared ? replica.better_gains : null;
@@ -51,7 +54,9 @@ export function Analysis({ analysis, files, onGains }: Props) {
       figures={drawn["tuning"]}
       description={tuning.description && <Flight description={tuning.description} />}
     >
-      {files && tuning.starts_campaign && <StartCampaign files={files} experiment={tuning.experiment} />}
+      {files && tuning.starts_campaign && (
+        <StartCampaign files={files} experiment={tuning.experiment} loggedVehicle={vehicle} />
+      )}
       {texts.tuning.parameter_file && <DownloadButton {...texts.tuning.parameter_file} />}
     </Part>,
     <Part
@@ -76,6 +81,7 @@ export function Analysis({ analysis, files, onGains }: Props) {
           {file_name}
         </Title>
         <Text c="dimmed">{[autopilot, release, frame].filter(Boolean).join(" · ")}</Text>
+        {vehicle !== null && <LoggedVehicles vehicles={vehicles} analysed={vehicle} onVehicle={onVehicle} />}
       </div>
       {tuning.grade === "refused" && compared ? parts.reverse() : parts}
     </article>

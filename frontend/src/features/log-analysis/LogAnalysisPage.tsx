@@ -48,7 +48,12 @@ export function LogAnalysisPage() {
         </Panel>
       )}
       {data && variables && (
-        <Analysis analysis={data} files={variables.files} onGains={(gains) => analyze({ ...variables, gains })} />
+        <Analysis
+          analysis={data}
+          files={variables.files}
+          onGains={(gains) => analyze({ ...variables, gains })}
+          onVehicle={(vehicle) => analyze({ files: variables.files, vehicle })}
+        />
       )}
       <Panel
         title={data ? "Analyse another log" : "Better altitude gains from one log"}

@@ -7,8 +7,15 @@ import { useVehicles } from "../../api/vehicles";
 import { SelectField } from "../../ui/Fields";
 import { ErrorNotice } from "../../ui/Notices";
 
+interface Props {
+  files: RecordFiles;
+  experiment: string | null;
+  /** System id of the one analysed, if the log has several. */
+  loggedVehicle: number | null;
+}
+
 /** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
-export function StartCampaign({ files, experiment }: { files: RecordFiles; experiment: string | null }) {
+export function StartCampaign({ files, experiment, loggedVehicle }: Props) {
   const { mutate, error, isPending } = useStartCampaign();
   const [chosen, setChosen] = useState("");
   const flying = (useVehicles().data ?? []).filter(
@@ -33,7 +40,7 @@ export function StartCampaign({ files, experiment }: { files: RecordFiles; exper
         disabled={isOpen}
         onClick={() =>
           mutate(
-            { files, vehicle: chosen === "" ? null : Number(chosen) },
+            { files, vehicle: chosen === "" ? null : Number(chosen), loggedVehicle },
             { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) },
           )
         }
