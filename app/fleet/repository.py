@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any, Final, TypeVar
 
-from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, union_all
+from sqlalchemy import Select, String, and_, delete, func, literal, null, or_, select, union_all
 from sqlalchemy.orm import Bundle, Session
 
 from app.common.states import (
@@ -76,24 +76,28 @@ def acts_of(vehicle_id: int) -> Select[VehicleActRow]:
 
 
 def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
-    """The lines of the ledger, each with its `purpose` and an `id`, half of which is that of its flight or act; and
+    """The lines of the ledger, each with its `kind` and an `id`, half of which is that of its flight or act; and
     their order, newest first.
 
     A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
     without that although its gains were on the vehicle. A connection that wrote nothing is a line if it read gains.
     """
     flight = FlightRow.vehicle_id == vehicle_id
+    is_left_with_its_gains = and_(
+        FlightRow.finished_at.is_not(null()),
+        FlightRow.read_back.is_not(null()),
+        FlightRow.safe_gains.is_not(null()),
+        FlightRow.vehicle.has(VehicleRow.registered),
+    )
     lines = union_all(
         select(
-            FlightRow.requested_at.label("at"),
-            (2 * FlightRow.id).label("id"),
-            literal("flight", String).label("purpose"),
+            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("id"), literal("flight", String).label("kind")
         ).where(flight),
         select(
             func.coalesce(FlightRow.restored_at, FlightRow.finished_at),
             2 * FlightRow.id + 1,
             literal(RESTORE_AFTER_FLIGHT, String),
-        ).where(flight, or_(FlightRow.restored_at.is_not(null()), _is_left_with_its_gains())),
+        ).where(flight, or_(FlightRow.restored_at.is_not(null()), is_left_with_its_gains)),
         select(VehicleActRow.requested_at, 2 * VehicleActRow.id, VehicleActRow.kind.cast(String)).where(
             VehicleActRow.vehicle_id == vehicle_id,
             VehicleActRow.kind.in_(GIVES_GAINS),
@@ -101,17 +105,7 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
             or_(VehicleActRow.asked.is_not(null()), VehicleActRow.read_back.is_not(null())),
         ),
     ).subquery()
-    return select(Bundle("line", lines.c.id, lines.c.purpose)), Order("-at", lines.c.at, descending=True)
-
-
-def _is_left_with_its_gains() -> ColumnElement[bool]:
-    """Whether a flight of a registered vehicle ended with its gains written and no safe gains read back since."""
-    return and_(
-        FlightRow.finished_at.is_not(null()),
-        FlightRow.read_back.is_not(null()),
-        FlightRow.safe_gains.is_not(null()),
-        FlightRow.vehicle.has(VehicleRow.registered),
-    )
+    return select(Bundle("line", lines.c.id, lines.c.kind)), Order("-at", lines.c.at, descending=True)
 
 
 def rows_by_id(session: Session, kind: type[T], ids: Iterable[int]) -> dict[int, T]:

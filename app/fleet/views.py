@@ -71,15 +71,15 @@ def ledger_view(session: Session, vehicle_id: int, part: Part) -> Page[GivenGain
 
 def _ledger_lines(session: Session, vehicle: VehicleRow, lines: Sequence[Row[Any]]) -> list[GivenGains]:
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
-    flights = repository.rows_by_id(session, FlightRow, [line.id // 2 for line in lines if line.purpose in of_flights])
+    flights = repository.rows_by_id(session, FlightRow, [line.id // 2 for line in lines if line.kind in of_flights])
     acts = repository.rows_by_id(
-        session, VehicleActRow, [line.id // 2 for line in lines if line.purpose not in of_flights]
+        session, VehicleActRow, [line.id // 2 for line in lines if line.kind not in of_flights]
     )
     items = []
     for line in lines:
-        if line.purpose == "flight":
+        if line.kind == "flight":
             items.append(_of_flight(flights[line.id // 2]))
-        elif line.purpose == repository.RESTORE_AFTER_FLIGHT:
+        elif line.kind == repository.RESTORE_AFTER_FLIGHT:
             items.append(_of_restoring(vehicle, flights[line.id // 2]))
         else:
             items.append(_of_act(acts[line.id // 2]))
