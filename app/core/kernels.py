@@ -58,7 +58,6 @@ class _Kernel:
         from numba import njit
 
         compiled: Callable[..., Any] = njit(nogil=True, cache=_use_cache(), error_model="numpy")(self._function)
-        type(self).__call__ = staticmethod(compiled)  # type: ignore[method-assign]
         return compiled
 
     @property
@@ -69,8 +68,7 @@ class _Kernel:
         dispatcher: Any = self._compiled
         return types.Dispatcher(dispatcher)
 
-    def __call__(self, *args: object, **kwargs: object) -> object:
-        """The first call. The compiled function then replaces this method, so later calls have no overhead."""
+    def __call__(self, *args: object, **kwargs: object) -> Any:
         return self._compiled(*args, **kwargs)
 
 
@@ -80,6 +78,4 @@ def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
     Callers see the types of the Python function. With `NUMBA_DISABLE_JIT=1` the Python function itself runs, so kernels
     must behave the same both ways: they must not rely on machine integers wrapping around.
     """
-    own_type = type(function.__name__, (_Kernel,), {})  # a class per kernel: its `__call__` is replaced
-    compiled_later: Callable[_P, _R] = own_type(function)
-    return compiled_later
+    return _Kernel(function)

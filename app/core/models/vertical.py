@@ -27,8 +27,8 @@ from app.core.control.vertical_guidance import (
     FB_CMD,
     FF_CMD,
     FULL_THRUST,
-    LARGEST_PRODUCT,
     LEVEL,
+    NOMINAL_HOVER_THROTTLE,
     POSITION_BITS,
     RATE_HZ,
     SPEED_BITS,
@@ -78,10 +78,8 @@ def delay_by(signal: Samples, steps: float) -> None:
     """Delay a signal by a fractional number of steps, in place; before its first sample it was at rest at 0."""
     whole = int(steps)
     part = steps - whole
-    for i in range(len(signal) - 1, -1, -1):
-        late = signal[i - whole] if i >= whole else 0.0
-        later = signal[i - whole - 1] if i > whole else 0.0
-        signal[i] = (1.0 - part) * late + part * later
+    before = np.concatenate((np.zeros(whole + 1), signal))
+    signal[:] = (1.0 - part) * before[1 : len(signal) + 1] + part * before[: len(signal)]
 
 
 @kernel
@@ -102,50 +100,26 @@ def sensed(history: Samples, step: int, delay_steps: float) -> float:
 def decay(x: float) -> float:
     """exp(−x) for x ≥ 0, accurate to 1e-13.
 
-    Multiplications only, so identical on every machine, and vectorisable over runs.
+    Multiplications only, so identical on every machine.
     """
     part = max(-x, -64.0) * (1 / 128)
     power = 1.0 + part * (1.0 + part * (1 / 2 + part * (1 / 6 + part * (1 / 24 + part * (1 / 120 + part * (1 / 720))))))
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    return power * power
+    for _ in range(7):
+        power *= power
+    return power
 
 
 @kernel
-def lift_of(
-    thrust: float,
-    altitude: float,
-    seconds: float,
-    share: float,
-    ground: float,
-    ground_height: float,
-    sag: float,
-    hover_force: float,
+def thrust_to_weight(
+    thrust: float, altitude: float, seconds: float, model: Samples, hover_force: float, ground_effect_height_m: float
 ) -> float:
-    """Thrust of the rotors in units of weight; `hover_force` is the force at hover throttle, a share of full force."""
+    """Thrust of the rotors in units of weight, by a model vector, shape (8,), and the force at hover throttle, a share
+    of full force."""
+    share, ground = model[QUADRATIC_SHARE], model[GROUND_EFFECT]
     ratio = ((1.0 - share) * thrust + share * thrust * thrust) / hover_force
     if ground > 0.0:
-        ratio *= 1.0 + ground * decay(altitude * (1.0 / ground_height))
-    return ratio * (1.0 - sag * (1.0 / BATTERY_SAG_S) * seconds)
-
-
-@kernel
-def thrust_to_weight(thrust: float, altitude: float, seconds: float, model: Samples, hover_force: float) -> float:
-    """The same with a model vector, shape (8,)."""
-    return lift_of(
-        thrust,
-        altitude,
-        seconds,
-        model[QUADRATIC_SHARE],
-        model[GROUND_EFFECT],
-        GROUND_EFFECT_HEIGHT_M,
-        model[BATTERY_SAG],
-        hover_force,
-    )
+        ratio *= 1.0 + ground * decay(altitude * (1.0 / ground_effect_height_m))
+    return float(ratio * (1.0 - model[BATTERY_SAG] * (1.0 / BATTERY_SAG_S) * seconds))
 
 
 @kernel
@@ -239,7 +213,8 @@ def fly_steps(
         else:
             channels[ALTITUDE, i], channels[CLIMB_RATE, i] = altitude, climb
         thrust += response * (command / FULL_THRUST - thrust)
-        lift = thrust_to_weight(thrust, altitude, now * STEP_S + latency, model, hover_force)
+        since_start_s = now * STEP_S + latency
+        lift = thrust_to_weight(thrust, altitude, since_start_s, model, hover_force, GROUND_EFFECT_HEIGHT_M)
         altitude, climb = advance(altitude, climb, GRAVITY_M_S2 * (lift - 1.0) - drag * climb)
         if disturbances is not None:
             altitude += disturbances[i, ALTITUDE]
@@ -253,24 +228,8 @@ def fly_steps(
 
 
 @kernel
-def steps_of_climb(targets: Counts) -> int:
-    """Steps until the first change of the targets, shape (t,); t if there is none."""
-    for i in range(len(targets)):
-        if targets[i] != targets[0]:
-            return i
-    return len(targets)
-
-
-@kernel
-def delay_start(signal: Samples, targets: Counts, latency_s: float) -> None:
-    """Delay the part of a signal before the first change of the targets, all of it if there is none, in place."""
-    climb = steps_of_climb(targets)
-    delay_by(signal[:climb] if climb < len(targets) else signal, latency_s * RATE_HZ)
-
-
-@kernel
-def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Samples | None, channels: Samples) -> int:
-    """Fly one flight to its `targets` (8 fractional bits, see `SetPoints`); return the largest |product| in the loop.
+def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Samples | None, channels: Samples) -> None:
+    """Fly one flight to its `targets` (8 fractional bits, see `SetPoints`).
 
     `gains` holds kp, ki, kd; `model` the eight parameters; `disturbances` have shape (n, 3). Writes `channels` every
     1/512 s from the command on, in the order of `CHANNELS`: shape (6, n), or (1, n) for the altitude alone.
@@ -279,15 +238,28 @@ def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Sample
     start(state, 0, 0)
     fly_steps(state, vehicle, new_past(model), model, ALT, targets, gains, disturbances, True, np.inf, False, channels)
     if model[START_LATENCY_S] > 0.0:
+        changed = np.flatnonzero(targets != targets[0])
+        first_change = changed[0] if len(changed) > 0 else channels.shape[1]
         for channel in range(channels.shape[0]):
-            delay_start(channels[channel], targets, model[START_LATENCY_S])
-    return int(state[LARGEST_PRODUCT])
+            delay_by(channels[channel, :first_change], model[START_LATENCY_S] * RATE_HZ)
 
 
-def fly(gains: Counts, model: Samples, set_points: SetPoints, samples: int) -> tuple[Samples, int]:
-    """One flight with every channel: shape (6, samples) in the order of `CHANNELS`, and the largest |product|."""
+def fly(
+    gains: Counts, model: Samples, set_points: SetPoints, samples: int, disturbances: Samples | None = None
+) -> Samples:
+    """One flight with every channel: shape (6, samples) in the order of `CHANNELS`."""
     channels = np.empty((len(CHANNELS), samples))
-    return channels, rollout(gains, model, set_points.targets, None, channels)
+    rollout(gains, model, set_points.targets, disturbances, channels)
+    return channels
+
+
+def reference_altitude(set_points: SetPoints, samples: int) -> Samples:
+    """The loop's reference, m up, in every step of a flight that starts with the command, shape (samples,): that of any
+    vehicle with any gains."""
+    model = np.zeros(BATTERY_SAG + 1)
+    model[HOVER_THROTTLE] = NOMINAL_HOVER_THROTTLE
+    reference_m: Samples = fly(np.zeros(3, dtype=np.int64), model, set_points, samples)[CHANNELS.index("reference_m")]
+    return reference_m
 
 
 def fly_each(
@@ -314,9 +286,7 @@ def fly_recorded(gains: Counts, model: Samples, set_points: SetPoints, disturban
     """The same for one flight with every channel, shape (6, n): gains (3,), model (8,)."""
     prompt = model.copy()
     prompt[[START_LATENCY_S, MEASUREMENT_DELAY_S]] = 0.0
-    channels = np.empty((len(CHANNELS), len(disturbances)))
-    rollout(gains, prompt, set_points.targets, disturbances, channels)
-    return channels
+    return fly(gains, prompt, set_points, len(disturbances), disturbances)
 
 
 @kernel
@@ -351,7 +321,7 @@ def observe(altitude: Samples, climb: Samples, thrust: Samples, model: Samples) 
         if i + 1 == len(altitude):
             break
         lagged += response * (thrust[i] - lagged)
-        lift = thrust_to_weight(lagged, altitude[i], i * STEP_S, model, hover_force)
+        lift = thrust_to_weight(lagged, altitude[i], i * STEP_S, model, hover_force, GROUND_EFFECT_HEIGHT_M)
         acceleration = GRAVITY_M_S2 * (lift - 1.0) - model[DRAG_1_S] * climb[i]
         height, speed = advance(altitude[i], climb[i], acceleration)
         found[i, ALTITUDE], found[i, CLIMB_RATE] = altitude[i + 1] - height, climb[i + 1] - speed
