@@ -252,6 +252,8 @@ def _model_in(schema: object) -> type[BaseModel] | None:
 
 async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if isinstance(error.__cause__, GainlineError):  # the framework passes on no other error while it reads a body
+        return problem_response(error.__cause__)
     detail, hint = str(error.detail), "Correct the request and send it again."
     if error.status_code in _HTTP:
         sentence, hint = _HTTP[error.status_code]

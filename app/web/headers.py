@@ -9,11 +9,13 @@ else as soon as the limit is exceeded.
 import gzip
 from dataclasses import dataclass
 from functools import lru_cache
+from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -135,25 +137,16 @@ class BodyLimitMiddleware:
             await problem_response(_too_large(limit))(scope, receive, send)
             return
         received = 0
-        has_started = False
 
         async def receive_bounded() -> Message:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
             if received > limit.size_bytes:
-                raise _too_large(limit)
+                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE) from _too_large(limit)
             return message
 
-        async def send_unless_too_large(message: Message) -> None:
-            nonlocal has_started
-            if has_started or received <= limit.size_bytes:
-                has_started = True
-                await send(message)
-
-        await self._app(scope, receive_bounded, send_unless_too_large)
-        if not has_started and received > limit.size_bytes:  # whatever the framework made of the error above
-            await problem_response(_too_large(limit))(scope, receive, send)
+        await self._app(scope, receive_bounded, send)
 
 
 def _too_large(limit: _Limit) -> TooLargeError:
