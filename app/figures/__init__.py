@@ -4,7 +4,6 @@ A new figure takes one file and one line in `CAMPAIGN_FIGURES`.
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final
 
 from app.figures.base import CampaignFigure
@@ -12,10 +11,8 @@ from app.figures.error_history import ErrorsFigure
 from app.figures.gains import GainsFigure
 from app.figures.takeoffs import TrajectoriesFigure
 
-CAMPAIGN_FIGURES: Final[Mapping[str, type[CampaignFigure]]] = MappingProxyType(
-    {
-        "takeoffs": TrajectoriesFigure,
-        "errors": ErrorsFigure,
-        "gains": GainsFigure,
-    }
-)
+CAMPAIGN_FIGURES: Final[Mapping[str, type[CampaignFigure]]] = {
+    "takeoffs": TrajectoriesFigure,
+    "errors": ErrorsFigure,
+    "gains": GainsFigure,
+}

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Final, Literal
 
 ThemeName = Literal["light", "dark"]
@@ -11,11 +10,11 @@ MOST_TICKS: Final = 12
 FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 'DejaVu Sans', sans-serif"
 
 
-MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({"l": 48, "r": 14, "t": 12, "b": 48})
+MARGIN_PX: Final[Mapping[str, int]] = {"l": 48, "r": 14, "t": 12, "b": 48}
 """Room for an axis with its title: if a margin grows while drawing, Plotly draws the whole chart a second time."""
 
 
-SIGNED_MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({**MARGIN_PX, "l": 62, "r": 18})
+SIGNED_MARGIN_PX: Final[Mapping[str, int]] = {**MARGIN_PX, "l": 62, "r": 18}
 """The same for signed numbers on the axis at the left, and a number at the right end of the abscissa."""
 
 
@@ -137,32 +136,30 @@ class Palette:
         return label(text, self.dim, **edge | more)
 
 
-PALETTES: Final[Mapping[ThemeName, Palette]] = MappingProxyType(
-    {
-        "light": Palette(
-            surface="#ffffff",
-            ink="#18202b",
-            dim="#545f6e",
-            grid="#e4e8ed",
-            best="#0a7a6c",
-            earlier="#8590a0",
-            prediction="#6d3fc0",
-            bad="#c0271f",
-            gains=("#0a7a6c", "#a85a00", "#2f5fc4"),
-        ),
-        "dark": Palette(
-            surface="#181d24",
-            ink="#eef2f6",
-            dim="#a9b4c1",
-            grid="#2d343e",
-            best="#3fd0bb",
-            earlier="#75818f",
-            prediction="#bfa3ff",
-            bad="#ff8a80",
-            gains=("#3fd0bb", "#ffb454", "#8fb3ff"),
-        ),
-    }
-)
+PALETTES: Final[Mapping[ThemeName, Palette]] = {
+    "light": Palette(
+        surface="#ffffff",
+        ink="#18202b",
+        dim="#545f6e",
+        grid="#e4e8ed",
+        best="#0a7a6c",
+        earlier="#8590a0",
+        prediction="#6d3fc0",
+        bad="#c0271f",
+        gains=("#0a7a6c", "#a85a00", "#2f5fc4"),
+    ),
+    "dark": Palette(
+        surface="#181d24",
+        ink="#eef2f6",
+        dim="#a9b4c1",
+        grid="#2d343e",
+        best="#3fd0bb",
+        earlier="#75818f",
+        prediction="#bfa3ff",
+        bad="#ff8a80",
+        gains=("#3fd0bb", "#ffb454", "#8fb3ff"),
+    ),
+}
 
 
 def with_opacity(colour: str, opacity: float) -> str:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
@@ -128,7 +127,7 @@ def _policy(*scripts: Markup) -> str:
     )
 
 
-_CHOICES: Final = MappingProxyType({"manual": "custom gains", "shorter step": "smaller step"})
+_CHOICES: Final = {"manual": "custom gains", "shorter step": "smaller step"}
 
 
 def _environment() -> "Environment":

@@ -8,7 +8,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -61,9 +60,7 @@ from app.processes.calls import FILE, run_limited
 from app.vehicles.flight_end import FlightEnd, Requester
 
 CURVE_POINTS: Final = 48
-_CAUSES: Final[Mapping[Requester | None, AbortCause]] = MappingProxyType(
-    {None: "limit", Requester.PROGRAM_STOPPED: "something else"}
-)
+_CAUSES: Final[Mapping[Requester | None, AbortCause]] = {None: "limit", Requester.PROGRAM_STOPPED: "something else"}
 """Causes of aborts that a person has not given: if Gainline was stopped, there is nothing to ask the operator."""
 
 
