@@ -50,7 +50,6 @@ from app.fleet import service as fleet
 from app.vehicles.registry import VEHICLE_KINDS
 
 LABELS: Final = "ABCDEFGHIJKLMNOPQRST"
-MAX_FLIGHTS: Final = len(LABELS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -295,12 +294,11 @@ def vehicle_name(campaign: CampaignRow) -> str:
 def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
     """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
     row, campaign = side.row, side.row.campaign
-    kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
     strategy = STRATEGIES[campaign.strategy]
     options = fleet.options_of(campaign)
     found = [
         FlightSetting(title="Vehicle", unit="", value=vehicle_name(campaign)),
-        *_options(options, () if kind is None else kind.options),
+        *_options(options, VEHICLE_KINDS[campaign.vehicle.kind].options),
         FlightSetting(title="Experiment", unit="", value=side.experiment.title),
         *_options(
             with_defaults(campaign.definition["experiment_options"], side.experiment.options), side.experiment.options
@@ -336,15 +334,9 @@ def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference
 
 
 def _options(values: Mapping[str, OptionValue], known: Iterable[Option]) -> list[FlightSetting]:
-    described = {option.name: option for option in known}
-    return [
-        FlightSetting(
-            title=described[name].title if name in described else name,
-            unit=described[name].unit if name in described else "",
-            value=value,
-        )
-        for name, value in values.items()
-    ]
+    described = {option.name: (option.title, option.unit) for option in known}
+    titled = ((*described.get(name, (name, "")), value) for name, value in values.items())
+    return [FlightSetting(title=title, unit=unit, value=value) for title, unit, value in titled]
 
 
 def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> list[FlightDifference]:

@@ -4,10 +4,10 @@ still be sent.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Final, TypeVar
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -21,7 +21,6 @@ from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.trials import service as trials_service
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
-from app.common.schemas import Page
 from app.common.states import AbortCause
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment
@@ -41,8 +40,8 @@ from app.vehicles.base import Identity
 from app.vehicles.flight_end import FlightEnd, cause_text
 from app.vehicles.registry import VEHICLE_KINDS
 
-_PAGE: Final = 200
-T = TypeVar("T")
+_ALL: Final = 2**31
+"""More than any list has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +107,7 @@ def describe_vehicle(
 ) -> tuple[Fact, ...]:
     """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
     vehicle = campaign.vehicle
-    kind = VEHICLE_KINDS.get(vehicle.kind)
-    titled = () if kind is None else [replace(each, title=each.label or each.title) for each in kind.options]
+    titled = [replace(each, title=each.label or each.title) for each in VEHICLE_KINDS[vehicle.kind].options]
     autopilot = vehicle.options.get("autopilot")
     foreign = {each.name for each in titled if each.autopilots and autopilot not in each.autopilots}
     own = {name: value for name, value in vehicle.options.items() if name not in foreign}
@@ -140,13 +138,13 @@ def _range_of(one: Gain) -> str:
 def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:
     """Strategy, start, bounds and stop rule, each with its settings."""
     definition = campaign.definition
-    strategy = STRATEGIES.get(definition.strategy)
+    strategy = STRATEGIES[definition.strategy]
     first, later = short_percent(definition.first_step_fraction), short_percent(definition.step_fraction)
     has_ceiling = experiment.output == "altitude_m"
     has_seed = campaign.vehicle.can_fly and not campaign.vehicle.registered
     return (
-        Fact("Strategy", definition.strategy if strategy is None else strategy.title),
-        *_options(definition.options, () if strategy is None else strategy.options),
+        Fact("Strategy", strategy.title),
+        *_options(definition.options, strategy.options),
         Fact("Start", _start(definition.start)),
         *(Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}") for name, (low, high) in definition.bounds.items()),
         Fact("Maximum step", f"{first} of each gain's range until a flight is valid, then {later}"),
@@ -281,7 +279,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     """Collect all data of a campaign, as for one reader. Raises NotFoundError."""
     campaign = campaigns.get_campaign(session, campaign_id)
     statistics = campaign_statistics(session, campaign_id)
-    trials = tuple(_all(lambda cursor: trials_service.list_trials(session, campaign_id, limit=_PAGE, cursor=cursor)))
+    trials = trials_service.list_trials(session, campaign_id, limit=_ALL, cursor=None).items
     definition = campaign.definition
     experiment = EXPERIMENTS[definition.experiment].configured(definition.experiment_options)
     vehicle = fleet.get_vehicle(session, campaign.vehicle.id)
@@ -300,32 +298,23 @@ def report_of(session: Session, campaign_id: int) -> Report:
         cards=tuple(card_of(figure(past)) for figure in CAMPAIGN_FIGURES.values()),
         remarks=tuple(remarks_on(session, campaign_id, trials)),
         photo_bytes=MAX_PHOTO_BYTES,
-        anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
+        anomalies=tuple(_anomalies(session, campaign, vehicle, trials, statistics.error_unit)),
         version=__version__,
         made_at=utc_now(),
     )
 
 
-def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
+def _anomalies(
+    session: Session, campaign: Campaign, vehicle: Vehicle, trials: Sequence[Trial], unit: str
+) -> Iterator[Anomaly]:
     yield from flight_anomalies(trials, unit)
     yield from (Anomaly(row.number, "Damaged record", _DAMAGED_RECORD) for row in damaged_trials(session, campaign.id))
-    if not campaign.vehicle.registered:
+    if not vehicle.registered:
         return
-    vehicle_id = campaign.vehicle.id
     yield from vehicle_anomalies(
         campaign,
-        fleet.get_vehicle(session, vehicle_id),
-        _all(lambda cursor: acts_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),
-        _all(lambda cursor: ledger_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),
+        vehicle,
+        acts_view(session, vehicle.id, limit=_ALL, cursor=None).items,
+        ledger_view(session, vehicle.id, limit=_ALL, cursor=None).items,
         trials,
     )
-
-
-def _all(page_after: Callable[[str | None], Page[T]]) -> Iterator[T]:
-    """All items of a paginated list."""
-    cursor = None
-    while True:
-        page = page_after(cursor)
-        yield from page.items
-        if (cursor := page.next_cursor) is None:
-            return
