@@ -22,6 +22,7 @@ from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
 from app.db.base import JsonObject, added, utc_now
 from app.db.models import VehicleActRow, VehicleRow
+from app.db.session import Database
 from app.fleet import repository
 from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import Vehicle, VehicleAct
@@ -72,10 +73,11 @@ def request_act(session: Session, vehicle_id: int, kind: ActKind, context: Reque
     return VehicleAct.view_of(_requested(session, row, kind, context))
 
 
-def require_may_stop_motors(session: Session, vehicle_id: int, context: RequestContext) -> None:
+def require_may_stop_motors(database: Database, vehicle_id: int, context: RequestContext) -> None:
     """Raise NotAllowedError when the client may not command a real vehicle, NotFoundError when there is no such
     vehicle."""
-    require_may(Permission.STOP, repository.get_one(session, vehicle_id), context)
+    with database.read() as session:
+        require_may(Permission.STOP, repository.get_one(session, vehicle_id), context)
 
 
 def release_vehicle(session: Session, vehicle_id: int, statement: str, context: RequestContext) -> Vehicle:
@@ -92,7 +94,6 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, context: 
     by = require_not_controlled_by_other(row, context)
     record_act(session, row, ActKind.RELEASE, by=by, reason=statement)
     record_released(session, row.id)
-    session.flush()
     return vehicle_view(row)
 
 

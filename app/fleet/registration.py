@@ -147,7 +147,6 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
         row.battery = edit.battery.strip()
     if edit.model_fields_set > {"version"}:
         row.version += 1
-    session.flush()
     return vehicle_view(row)
 
 

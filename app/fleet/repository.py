@@ -13,7 +13,6 @@ from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     FLOWN_FLIGHT_STATES,
     GIVES_GAINS,
-    ActKind,
     ActState,
     VehicleState,
 )
@@ -152,8 +151,3 @@ def has_taken_off(session: Session, vehicle_id: int, *, since: datetime) -> bool
     """Whether a flight of the vehicle took off after that time, and was not found unflown."""
     flown = select(FlightRow.id).join(TrialRow).where(FlightRow.vehicle_id == vehicle_id, TrialRow.flown_at > since)
     return session.scalar(flown.limit(1)) is not None
-
-
-def safe_gains_acts(session: Session, vehicle_id: int) -> Sequence[VehicleActRow]:
-    wanted = acts_of(vehicle_id).where(VehicleActRow.kind == ActKind.SAFE_GAINS)
-    return session.scalars(wanted.order_by(VehicleActRow.id)).all()

@@ -121,13 +121,8 @@ async def stop_motors(
     """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
     The database is read first only for a client that may not command real vehicles, to see whether this is one."""
     if not is_allowed(Permission.STOP, asking.caller):
-        await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
+        await run_in_threadpool(commands.require_may_stop_motors, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The command to stop the motors has been sent.")
-
-
-def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: RequestContextDep) -> None:
-    with database.read() as session:
-        commands.require_may_stop_motors(session, vehicle_id, asking)
 
 
 async def _order(

@@ -17,7 +17,7 @@ from app.common.schemas import OptionValue, Page
 from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, VehicleState
 from app.core.policy import Gains
 from app.db.base import added, utc_now
-from app.db.models import CampaignRow, VehicleRow
+from app.db.models import CampaignRow, VehicleActRow, VehicleRow
 from app.db.pages import Order, page_of
 from app.figures.vehicle_history import BatteryFlight
 from app.fleet import repository
@@ -29,22 +29,18 @@ from app.vehicles.registry import VEHICLE_KINDS, get_kind
 
 def can_fly(row: VehicleRow) -> bool:
     """Whether the program can fly it, rather than import records of flights flown elsewhere."""
-    kind = VEHICLE_KINDS.get(row.kind)
-    return kind is not None and kind.can_fly
+    return VEHICLE_KINDS[row.kind].can_fly
 
 
 def experiments_of(row: VehicleRow) -> list[str]:
     """Experiments whose gains the vehicle has; for a shared vehicle, all that its kind can fly."""
-    kind = VEHICLE_KINDS.get(row.kind)
-    if kind is None:
-        return []
+    kind = VEHICLE_KINDS[row.kind]
     return list(kind.experiments_with(row.options) if row.registered else kind.experiments)
 
 
 def settings_of(row: VehicleRow) -> dict[str, OptionValue]:
     """The settings of a registered vehicle, with defaults filled in."""
-    kind = VEHICLE_KINDS.get(row.kind)
-    return dict(row.options) if kind is None else kind.completed(row.options)
+    return VEHICLE_KINDS[row.kind].completed(row.options)
 
 
 def is_registered_one_by_one(kind: VehicleKind) -> bool:
@@ -188,8 +184,6 @@ _ACTS: Final[Mapping[str, str]] = {
     ActKind.RESTORE: "its safe gains are being restored",
     ActKind.PARAMETERS: "its parameters are being read",
     ActKind.RELEASE: "it is being released",
-    ActKind.LAND: "it is being commanded to land",
-    ActKind.MOTORS_OFF: "its motors are being commanded to stop",
 }
 
 
@@ -201,7 +195,7 @@ def require_idle(session: Session, row: VehicleRow) -> None:
             hint="Wait until it has landed, or abort it; flights do not queue.",
         )
     if (act := repository.act_under_way(session, row.id)) is not None:
-        raise BusyError(f"{row.name} is busy: {_ACTS.get(act.kind, act.kind)}.", hint="Wait until that has finished.")
+        raise BusyError(f"{row.name} is busy: {_ACTS[act.kind]}.", hint="Wait until that has finished.")
 
 
 def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:
@@ -306,4 +300,5 @@ def battery_flights(session: Session, vehicle_id: int) -> list[BatteryFlight]:
 
 def safe_gains_changes(session: Session, vehicle_id: int) -> list[datetime]:
     """Times at which the safe gains were set, oldest first."""
-    return [row.requested_at for row in repository.safe_gains_acts(session, vehicle_id)]
+    wanted = repository.acts_of(vehicle_id).where(VehicleActRow.kind == ActKind.SAFE_GAINS)
+    return [row.requested_at for row in session.scalars(wanted.order_by(VehicleActRow.id))]

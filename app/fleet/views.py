@@ -50,12 +50,6 @@ def _command_outcome(kind: ActKind, flight: FlightRow) -> tuple[ActState, str]:
     return ActState.REQUESTED if flight.state == FlightState.REQUESTED else ActState.RUNNING, ""
 
 
-def _flight_id(row: VehicleActRow) -> int | None:
-    """The flight that an act is a command of; None for other acts."""
-    found = (row.result or {}).get("flight_id") if row.kind in FLIGHT_COMMANDS else None
-    return found if isinstance(found, int) else None
-
-
 def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
     """Page of acts, newest first. Raises NotFoundError."""
     repository.get_one(session, vehicle_id)
@@ -70,7 +64,7 @@ def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | No
 
 
 def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleAct]:
-    of_flights = {row.id: flight_id for row in rows if (flight_id := _flight_id(row)) is not None}
+    of_flights = {row.id: row.result["flight_id"] for row in rows if row.result and row.kind in FLIGHT_COMMANDS}
     flights = repository.rows_by_id(session, FlightRow, of_flights.values())
     return [_act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
 
