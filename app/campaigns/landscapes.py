@@ -16,7 +16,6 @@ from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
 from app.campaigns.figure_data import history_of
 from app.campaigns.proposals import is_stale, read_history
-from app.common.errors import GainlineError
 from app.common.states import JobState
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import percent
@@ -71,10 +70,7 @@ def read_proposed(session: Session, campaign_id: int, order: JsonObject) -> tupl
     """Read the job's proposal and what it was computed from. Raises SupersededError when the campaign's flights have
     changed since."""
     past = read_history(session, campaign_id)
-    named = order.get("proposal_id")
-    proposal = session.get(ProposalRow, named) if isinstance(named, int) else None
-    if proposal is None:
-        raise GainlineError("The job names no proposal.", hint="Open the campaign to compute it again.")
+    proposal = session.get_one(ProposalRow, order["proposal_id"])
     if proposal.history_digest != past.digest:
         raise jobs.SupersededError(
             "The campaign's flights have changed since these gains were proposed.",

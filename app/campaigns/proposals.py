@@ -238,9 +238,10 @@ def history_changed(session: Session, row: CampaignRow) -> None:
 
 def safe_gains_changed(session: Session, vehicle_id: int) -> None:
     """Request new proposals for the vehicle's unflown campaigns, which start from its safe gains."""
-    for row in repository.unflown_on(session, vehicle_id):
-        cancel_outdated(session, row)
-        request_proposal(session, row)
+    for row in repository.of_vehicle(session, vehicle_id):
+        if row.definition_digest is None:
+            cancel_outdated(session, row)
+            request_proposal(session, row)
 
 
 _CHOICE_KINDS: Final[Mapping[str, ChoiceKind]] = {

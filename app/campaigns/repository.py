@@ -153,13 +153,6 @@ def campaigns_wanted(search: str, states: Collection[CampaignState], vehicles: C
     return select(CampaignRow).join(CampaignRow.vehicle).where(*wanted)
 
 
-def unflown_on(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
-    """The vehicle's campaigns that have not flown."""
-    return session.scalars(
-        select(CampaignRow).where(CampaignRow.vehicle_id == vehicle_id, CampaignRow.definition_digest.is_(None))
-    ).all()
-
-
 def rehearsals(session: Session, campaign_id: int) -> Sequence[CampaignRow]:
     """The campaigns that rehearse this one, newest first."""
     joined = select(CampaignRow).join(RehearsalRow, RehearsalRow.rehearsal_id == CampaignRow.id)

@@ -325,7 +325,6 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     because = f"{asked.statement} (campaign {row.id}, {named_flights(now.winner.numbers)}: better, {sure} confidence)"
     promote_gains(session, row.vehicle, gains, version=asked.version, reason=because, context=context)
     safe_gains_changed(session, row.vehicle_id)
-    session.flush()
     return get_vehicle(session, row.vehicle_id)
 
 

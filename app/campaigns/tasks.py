@@ -7,7 +7,6 @@ import numpy as np
 import structlog
 
 from app.campaigns import computation, landscapes, proposals
-from app.common.errors import GainlineError
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob
@@ -46,8 +45,7 @@ def compute_landscape(database: Database, pool: ComputePool, job: ClaimedJob, *,
     with database.read() as session:
         past, proposal = landscapes.read_proposed(session, job.campaign_id, job.order)
     survey = pool.run(landscapes.plan, past, proposal.gains, proposal.explanation.get("base_flight"))
-    if survey is None:
-        raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
+    assert survey is not None, "asked for only where there is a model, with two free gains"
     points = survey.points()
     parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
     errors, done, told_s = [], 0, started_s

@@ -57,7 +57,6 @@ _HINTS: Final[Mapping[CampaignState, str]] = {
 
 
 def campaign_view(session: Session, row: CampaignRow) -> Campaign:
-    session.flush()
     trials = history.trials_of(session, row.id)
     flight = history.flight_under_way(session, row.id)
     now = flown_evidence(row, trials)
@@ -126,7 +125,6 @@ def _summary(
 
 def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
     """State of the next proposal, which is computed in the background: fresh, stale, being computed, or impossible."""
-    session.flush()
     trials = history.trials_of(session, row.id)
     latest = repository.latest_proposal(session, row.id)
     shown = None if latest is None else proposal_view(session, row, latest, trials)

@@ -58,9 +58,6 @@ class LandscapeFigure(CampaignFigure):
     name = "landscape"
     title = "Error landscape of the model"
 
-    def not_ready(self) -> str | None:
-        return None if self.landscape.slices else "Nothing to draw: fewer than two gains are free."
-
     def compute(self) -> Card:
         slices = self.landscape.slices
         scale = scale_of(slices)

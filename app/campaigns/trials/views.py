@@ -89,7 +89,6 @@ def trial_view(session: Session, row: TrialRow) -> Trial:
 
 def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
     """Views of some trials of a campaign."""
-    session.flush()
     flights = history.latest_flights(session, [row.id for row in rows])
     field = ReferenceFlights(history.valid_flights(session, campaign.id), experiment_of_campaign(campaign).scatter)
     rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
