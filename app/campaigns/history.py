@@ -110,17 +110,6 @@ def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
     return tuple(_flight(row, _NOTHING, {}) for row in in_history(trials))
 
 
-def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
-    """The scored flights in their order, with gains and errors only, so that many are read quickly."""
-    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
-        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
-    )
-    return tuple(
-        Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
-        for number, gains, error in session.execute(wanted.order_by(TrialRow.number))
-    )
-
-
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
     """The valid and the aborted trials."""
     return [row for row in trials if row.state in HISTORY_TRIAL_STATES]

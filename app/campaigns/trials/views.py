@@ -2,27 +2,23 @@
 given the scatter of repeated flights.
 """
 
-from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import accumulate
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import get_experiment
 from app.campaigns import history
-from app.campaigns.definitions import experiment_of_campaign
+from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.common.conflict_checks import allowed
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
-from app.core.definition import Flight, Interval
-from app.core.experiments.base import Scatter
+from app.core.experiments.base import Experiment
 from app.core.formatting import named_flights, percent_of, short
-from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS
-from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
+from app.core.statistics.comparisons import compare
+from app.core.tuning.evidence import Evidence
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.flight_end import Requester, cause_text, end_text, is_worded, unstaged_text
@@ -30,56 +26,26 @@ from app.vehicles.flight_end import Requester, cause_text, end_text, is_worded, 
 CONFIDENCE: Final = 0.9
 
 
-class ReferenceFlights:
-    """The valid flights that a campaign's trials are compared with, indexed for constant or logarithmic lookup.
-
-    `valid` are the flights in their order, `prior` is the experiment's scatter. `numbers` are those of the flights that
-    have an error; `by_number` and `by_gains` hold all flights with the gains of one.
-    """
-
-    def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
-        groups = groups_of(valid)
-        scored = [(flight.error, flight.number) for flight in valid if flight.error is not None]
-        self.numbers: Final = [number for _, number in scored]
-        self._best_so_far = list(accumulate(scored, min))
-        self.by_number: Final[Mapping[int, Group]] = {number: group for group in groups for number in group.numbers}
-        self.by_gains: Final[Mapping[object, Group]] = {_key(group.gains): group for group in groups}
-        self.scatter: Final[PooledScatter | None] = pool_scatter(groups, prior) if groups else None
-
-    def best_before(self, number: int) -> tuple[float, int] | None:
-        """Error and number of the best flight before the given one."""
-        before = bisect_left(self.numbers, number)
-        return self._best_so_far[before - 1] if before else None
-
-    def told_prediction(self, row: TrialRow) -> tuple[float | None, Interval | None]:
-        """The predicted error of a flight and its interval; both None if they said nothing."""
-        is_corrected = self.best_before(row.number) is not None
-        return history.told_prediction(row.predicted_error, row.predicted_interval, corrected=is_corrected)
-
-
-def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
+def comparisons(row: TrialRow, now: Evidence[Experiment], best_before: int | None) -> list[TrialComparison]:
     """Comparisons with the best flight before this one, then with the first; flights of the same gains are left out.
 
     Each side counts with all flights of its gains.
     """
-    own, best = field.by_number.get(row.number), field.best_before(row.number)
-    if own is None or field.scatter is None or best is None:
+    by_number = {number: group for group in now.groups for number in group.numbers}
+    own = by_number.get(row.number)
+    if own is None or best_before is None:
         return []
-    others = {best[1]: "best before"}
-    others.setdefault(field.numbers[0], "first")
+    others = {best_before: "best before"}
+    others.setdefault(now.valid[0].number, "first")
     return [
         TrialComparison.view_of(
-            compare(own, field.by_number[number], field.scatter, CONFIDENCE, plan_further=False),
+            compare(own, by_number[number], now.scatter, CONFIDENCE, plan_further=False),
             against=against,
             trial_number=number,
         )
         for number, against in others.items()
-        if field.by_number[number].gains != own.gains
+        if by_number[number].gains != own.gains
     ]
-
-
-def _key(gains: Gains) -> object:
-    return tuple(sorted(gains.items()))
 
 
 def trial_view(session: Session, row: TrialRow) -> Trial:
@@ -90,14 +56,18 @@ def trial_view(session: Session, row: TrialRow) -> Trial:
 def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
     """Views of some trials of a campaign."""
     flights = history.latest_flights(session, [row.id for row in rows])
-    field = ReferenceFlights(history.valid_flights(session, campaign.id), experiment_of_campaign(campaign).scatter)
+    now = flown_evidence(campaign, history.trials_of(session, campaign.id))
     rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
-    return [_view(row, field, flights.get(row.id), rehearsed) for row in rows]
+    return [_view(row, now, flights.get(row.id), rehearsed) for row in rows]
 
 
-def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehearsed: bool) -> Trial:
-    predicted_error, interval = field.told_prediction(row)
-    same = field.by_gains.get(_key(row.gains))
+def _view(row: TrialRow, now: Evidence[Experiment], flight: FlightRow | None, rehearsed: bool) -> Trial:
+    before = ((each.error, each.number) for each in now.valid if each.error is not None and each.number < row.number)
+    best = min(before, default=None)
+    predicted_error, interval = history.told_prediction(
+        row.predicted_error, row.predicted_interval, corrected=best is not None
+    )
+    same = next((group for group in now.groups if group.gains == row.gains), None)
     again = [] if same is None else [number for number in same.numbers if number < row.number]
     return Trial.view_of(
         row,
@@ -107,10 +77,10 @@ def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehe
         if interval is None or row.error is None
         else interval.lower <= row.error <= interval.upper,
         group=None
-        if same is None or field.scatter is None
-        else GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size),
-        comparisons=comparisons(row, field),
-        verdict=verdict(row, field, get_experiment(row.campaign.experiment).error_unit, again),
+        if same is None
+        else GroupBrief(mean=same.mean, standard_error=same.known_error(now.scatter), n=same.size),
+        comparisons=comparisons(row, now, best and best[1]),
+        verdict=verdict(row, best, predicted_error, now.experiment.error_unit, again),
         glitches=row.glitches or [],
         record=None
         if row.trajectory is None
@@ -137,16 +107,17 @@ def _view(row: TrialRow, field: ReferenceFlights, flight: FlightRow | None, rehe
     )
 
 
-def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
-    """Sentence that compares the flight with the best before it and with its prediction.
+def verdict(
+    row: TrialRow, best: tuple[float, int] | None, predicted_error: float | None, unit: str, again: Sequence[int]
+) -> str:
+    """Sentence that compares the flight with the `best` before it, its error and number, and with its prediction.
 
     A trial that repeats the gains of the flights `again` is not compared with the best.
     """
     match row.state:
         case TrialState.VALID if row.error is not None:
-            compared = _compared(row.error, field.best_before(row.number), unit)
+            compared = _compared(row.error, best, unit)
             outcome = f", repeating the gains of {named_flights(again)}" if again else f": {compared}"
-            predicted_error, _ = field.told_prediction(row)
             forecast = "" if predicted_error is None else f"; {short(predicted_error)} {unit} was predicted"
             return f"{short(row.error)} {unit}{outcome}{forecast}."
         case TrialState.ABORTED:

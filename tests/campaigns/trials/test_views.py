@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.campaigns.trials.views import ReferenceFlights, verdict
+from app.campaigns.trials.views import verdict
 from app.common.states import TrialState
-from app.core.experiments.base import Scatter
 from app.db.models import TrialRow
 from app.db.session import Database
 from app.vehicles.flight_end import Failure, FlightEnd
@@ -81,7 +80,7 @@ def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_th
 def test_the_text_about_a_doubtful_flight_has_one_full_stop_after_its_reason() -> None:
     end = FlightEnd(failure=Failure.LOST_POSITION, remarks=("None of its positions was plausible for 0.5 s.",))
     row = TrialRow(number=1, state=TrialState.CAPTURED, reason="", ending="invalid", end=end, glitches=[])
-    assert verdict(row, ReferenceFlights([], Scatter(0.01, 1.0)), "m") == (
+    assert verdict(row, None, None, "m", again=()) == (
         "Landed and recorded; the measurement is doubtful: The vehicle's position was lost. None of its positions was "
         "plausible for 0.5 s. Review the flight."
     )
