@@ -11,14 +11,14 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AwareDatetime, Field, TypeAdapter
 from pydantic_core import to_json
-from sqlalchemy import ColumnElement, Select, String, func, literal, tuple_
+from sqlalchemy import ColumnElement, Row, Select, String, func, literal, tuple_
 from sqlalchemy.orm import Session
 
 from app.common.errors import InputError, Problem
 from app.common.schemas import Number, Page
 from app.db.base import Reported, UtcDateTime
 
-R = TypeVar("R", bound=Reported)
+R = TypeVar("R", bound=Reported | Row[Any])
 V = TypeVar("V")
 
 

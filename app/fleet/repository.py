@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
-from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, tuple_, union_all
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, union_all
+from sqlalchemy.orm import Bundle, Session
 
 from app.common.errors import NotFoundError
 from app.common.states import (
@@ -16,12 +16,10 @@ from app.common.states import (
     ActState,
     VehicleState,
 )
-from app.db.base import UtcDateTime
 from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleActRow, VehicleRow
+from app.db.pages import Order
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
-Line = tuple[str, int]
-"""A line of the ledger: its purpose and the id of its flight or act."""
 
 T = TypeVar("T", FlightRow, VehicleActRow)
 
@@ -83,10 +81,9 @@ def acts_of(vehicle_id: int) -> Select[VehicleActRow]:
     return select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
 
 
-def ledger(
-    session: Session, vehicle_id: int, *, before: tuple[datetime, int] | None, limit: int
-) -> tuple[list[tuple[Line, tuple[datetime, int]]], int]:
-    """The newest `limit` + 1 lines before that position, each with its own position; and the total count.
+def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
+    """The lines of the ledger, each with its purpose `why` and an `id`, half of which is that of its flight or act; and
+    their order, newest first.
 
     A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
     without that although its gains were on the vehicle. A connection that wrote nothing is a line if it read gains.
@@ -94,7 +91,7 @@ def ledger(
     flight = FlightRow.vehicle_id == vehicle_id
     lines = union_all(
         select(
-            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("rank"), literal("flight", String).label("why")
+            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("id"), literal("flight", String).label("why")
         ).where(flight),
         select(
             func.coalesce(FlightRow.restored_at, FlightRow.finished_at),
@@ -108,13 +105,7 @@ def ledger(
             or_(VehicleActRow.asked.is_not(null()), VehicleActRow.read_back.is_not(null())),
         ),
     ).subquery()
-    total = session.scalar(select(func.count()).select_from(lines)) or 0
-    wanted = select(lines).order_by(lines.c.at.desc(), lines.c.rank.desc())
-    if before is not None:
-        at = literal(before[0], UtcDateTime())
-        wanted = wanted.where(tuple_(lines.c.at, lines.c.rank) < tuple_(at, literal(before[1])))
-    found = session.execute(wanted.limit(limit + 1)).all()
-    return [((row.why, row.rank // 2), (row.at, row.rank)) for row in found], total
+    return select(Bundle("line", lines.c.id, lines.c.why)), Order("-at", lines.c.at, descending=True)
 
 
 def _is_left_with_its_gains() -> ColumnElement[bool]:

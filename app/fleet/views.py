@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Final
+from typing import Any
 
+from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
 from app.common.schemas import Page
@@ -22,8 +23,6 @@ from app.db.pages import Order, page_of
 from app.fleet import repository
 from app.fleet.schemas import GivenGains, VehicleAct
 from app.vehicles.flight_end import end_text
-
-_NEWEST_FIRST: Final = Order("-at", FlightRow.requested_at.expression, descending=True)
 
 
 def _act_view(row: VehicleActRow, flight: FlightRow | None) -> VehicleAct:
@@ -72,22 +71,23 @@ def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleA
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
     """Page of the gain sets that the vehicle was given, newest first. Raises NotFoundError."""
     vehicle = repository.get_one(session, vehicle_id)
-    before = None if cursor is None else _NEWEST_FIRST.position_of(cursor)
-    found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
-    shown = [line for line, _ in found[:limit]]
+    wanted, order = repository.ledger(vehicle_id)
+    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=partial(_ledger_lines, session, vehicle))
+
+
+def _ledger_lines(session: Session, vehicle: VehicleRow, lines: Sequence[Row[Any]]) -> list[GivenGains]:
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
-    flights = repository.rows_by_id(session, FlightRow, [id_ for purpose, id_ in shown if purpose in of_flights])
-    acts = repository.rows_by_id(session, VehicleActRow, [id_ for purpose, id_ in shown if purpose not in of_flights])
+    flights = repository.rows_by_id(session, FlightRow, [line.id // 2 for line in lines if line.why in of_flights])
+    acts = repository.rows_by_id(session, VehicleActRow, [line.id // 2 for line in lines if line.why not in of_flights])
     items = []
-    for purpose, identity in shown:
-        if purpose == "flight":
-            items.append(_of_flight(flights[identity]))
-        elif purpose == repository.RESTORE_AFTER_FLIGHT:
-            items.append(_of_restoring(vehicle, flights[identity]))
+    for line in lines:
+        if line.why == "flight":
+            items.append(_of_flight(flights[line.id // 2]))
+        elif line.why == repository.RESTORE_AFTER_FLIGHT:
+            items.append(_of_restoring(vehicle, flights[line.id // 2]))
         else:
-            items.append(_of_act(acts[identity]))
-    following = _NEWEST_FIRST.cursor_at(*found[limit - 1][1]) if len(found) > limit else None
-    return Page(items=items, total=total, next_cursor=following)
+            items.append(_of_act(acts[line.id // 2]))
+    return items
 
 
 def _of_flight(row: FlightRow) -> GivenGains:
