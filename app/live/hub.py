@@ -205,40 +205,19 @@ def changes_after(database: Database, event_id: int) -> Iterator[EventRow]:
         event_id = batch[-1].id
 
 
-class OutboxTail:
-    """A thread that calls `publish(change)` for every event committed after `start`."""
-
-    def __init__(self, database: Database, publish: Callable[[EventRow], None]) -> None:
-        self._database = database
-        self._publish = publish
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="outbox tail", daemon=True)
-
-    def start(self) -> None:
-        """Note the present end of the outbox, and start the thread."""
-        with self._database.read() as session:
-            self._last = latest_event_id(session)
-        self._thread.start()
-
-    def stop(self) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                self._follow()
-            except (StorageError, DBAPIError) as error:
-                _log.error("the outbox cannot be read", why=str(error))
-                self._stop.wait(PAUSE_AFTER_TROUBLE_S)
-
-    def _follow(self) -> None:
-        with DatabaseWatch(self._database.file) as watch:
-            while not self._stop.is_set():
-                for change in changes_after(self._database, self._last):
-                    self._publish(change)
-                    self._last = change.id
-                watch.wait(self._stop, LOOK_ANYWAY_S)
+def follow_outbox(database: Database, last: int, publish: Callable[[EventRow], None], stop: threading.Event) -> None:
+    """Call `publish` for every event committed after the `last` one, until `stop` is set."""
+    while not stop.is_set():
+        try:
+            with DatabaseWatch(database.file) as watch:
+                while not stop.is_set():
+                    for change in changes_after(database, last):
+                        publish(change)
+                        last = change.id
+                    watch.wait(stop, LOOK_ANYWAY_S)
+        except (StorageError, DBAPIError) as error:
+            _log.error("the outbox cannot be read", why=str(error))
+            stop.wait(PAUSE_AFTER_TROUBLE_S)
 
 
 BEAT_S: Final = 3.0
@@ -283,8 +262,11 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
         with suppress(RuntimeError):  # the loop has ended
             loop.call_soon_threadsafe(live.hub.publish, change)
 
-    tail = OutboxTail(database, publish)
-    await asyncio.to_thread(tail.start)
+    with database.read() as session:
+        last = latest_event_id(session)
+    stop = threading.Event()
+    tail = threading.Thread(target=follow_outbox, args=(database, last, publish, stop), name="outbox", daemon=True)
+    tail.start()
     running = [asyncio.create_task(work) for work in (live.client.run(), live.client.watch(), live.beat())]
     try:
         yield live
@@ -292,7 +274,6 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
         live.hub.close()
         for task in running:
             task.cancel()
-        for task in running:
-            with suppress(asyncio.CancelledError):
-                await task
-        await asyncio.to_thread(tail.stop)
+        await asyncio.gather(*running, return_exceptions=True)
+        stop.set()
+        await asyncio.to_thread(tail.join)

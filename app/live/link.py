@@ -49,8 +49,7 @@ UNCONFIRMED: Final = (
     "The process that has the vehicle's link did not answer, and will not execute the command later: use the "
     "vehicle's own remote control now."
 )
-FIRST_PAUSE_S: Final = 0.05
-LONGEST_PAUSE_S: Final = 0.5
+CONNECT_EVERY_S: Final = 0.1
 ANSWER_TIMEOUT_S: Final = 2.0
 ORDER_TIMEOUT_S: Final = 1.5
 """A later request is not carried out; less than ANSWER_TIMEOUT_S, so that the worker has time to answer that."""
@@ -220,16 +219,13 @@ class LiveClient:
 
     async def run(self) -> None:
         """Connect and listen until cancelled."""
-        pause_s = FIRST_PAUSE_S
         while True:
             try:
                 reader, writer = await asyncio.open_unix_connection(str(self._path), limit=MAX_LINE_BYTES)
             except OSError:
-                await asyncio.sleep(pause_s)
-                pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
-                continue
-            pause_s = FIRST_PAUSE_S
-            await self._listen(reader, writer)
+                await asyncio.sleep(CONNECT_EVERY_S)
+            else:
+                await self._listen(reader, writer)
 
     async def abort(self, trial_id: int, reason: str) -> Answer:
         """Request that the worker aborts a flight, without the database, and wait for its answer. Raises
