@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from app.autopilots.registry import EXPERIMENTS, experiment_of, get_experiment
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
-from app.common.errors import InputError, NotFoundError, Problem
+from app.common.errors import InputError, Problem
 from app.common.schemas import Number, Text
 from app.core.definition import Definition
 from app.core.policy import shortened
@@ -45,9 +45,7 @@ def preset_names() -> tuple[str, ...]:
 
 
 def read_preset(name: str) -> CampaignFile:
-    """Read a preset. Raises NotFoundError that names the available presets."""
-    if name not in preset_names():
-        raise NotFoundError("preset", name, hint=f"Choose one of {', '.join(preset_names())}, or give a YAML file.")
+    """Read the preset of that name, one of `preset_names`."""
     return read_campaign_file(PRESETS_DIR / f"{name}.yaml")
 
 

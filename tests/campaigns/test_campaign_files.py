@@ -7,7 +7,7 @@ import pytest
 
 from app.campaigns.campaign_files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
 from app.campaigns.definitions import check_campaign
-from app.common.errors import InputError, NotFoundError
+from app.common.errors import InputError
 from app.core.definition import Definition
 
 
@@ -115,11 +115,6 @@ def test_a_binary_file_is_not_yaml(tmp_path: Path) -> None:
     path.write_bytes(bytes(range(256)))
     with pytest.raises(InputError, match="not YAML"):
         read_campaign_file(path)
-
-
-def test_an_unknown_preset_is_not_found() -> None:
-    with pytest.raises(NotFoundError):
-        read_preset("ardrone-landing")
 
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "campaign-files.md").read_text(encoding="utf-8")
