@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.proposals import is_stale
-from app.common.states import TrialState
+from app.common.states import FLOWN_TRIAL_STATES, TrialState
 from app.core.definition import Interval
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.records.flight_events import flight_events, pinned_notes
@@ -107,7 +107,7 @@ def history_of(session: Session, campaign_id: int, view: FigureView | None = Non
     rows = history.trials_of(session, campaign_id)
     evidence = flown_evidence(campaign, rows)
     definition, experiment = evidence.definition, evidence.experiment
-    flown = [row for row in rows if row.state in history.FLOWN]
+    flown = [row for row in rows if row.state in FLOWN_TRIAL_STATES]
     set_point, reference = _goal(experiment)
     shown = view or FigureView()
     bare = History(
@@ -291,7 +291,7 @@ def _flight_record(session: Session, row: TrialRow) -> FlightRecordData:
         if record is None or experiment.output != "altitude_m"
         else flight_events(record, glitches_s, () if set_points is None else set_points.pushes),
         notes=pinned_notes(row.note),
-        is_over=row.state in history.FLOWN,
+        is_over=row.state in FLOWN_TRIAL_STATES,
         by_reference=experiment.target_channel is not None,
     )
 

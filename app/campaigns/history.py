@@ -22,6 +22,7 @@ from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     CAMPAIGN_TRANSITIONS,
     FLIGHT_TRANSITIONS,
+    FLOWN_TRIAL_STATES,
     HISTORY_TRIAL_STATES,
     NOT_AGAINST_GAINS,
     TRIAL_TRANSITIONS,
@@ -41,11 +42,6 @@ from app.vehicles.flight_end import FlightEnd, not_begun
 
 _INTERVAL: Final = TypeAdapter(Interval)
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
-
-FLOWN: Final = frozenset(
-    {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
-)
-"""States of trials that have left the ground."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -121,7 +117,11 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 
     Trials need not fly in the order of their numbers.
     """
-    flown = [(row.flown_at, row.number, row) for row in trials if row.state in FLOWN and row.flown_at is not None]
+    flown = [
+        (row.flown_at, row.number, row)
+        for row in trials
+        if row.state in FLOWN_TRIAL_STATES and row.flown_at is not None
+    ]
     return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
 
 

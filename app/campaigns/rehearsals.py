@@ -5,11 +5,11 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.campaigns import history, repository
+from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import Rehearsal, RehearsalState
 from app.common.errors import ConflictError
-from app.common.states import Outcome, TrialState
+from app.common.states import FLOWN_TRIAL_STATES, Outcome, TrialState
 from app.core.formatting import count
 from app.db.models import CampaignRow
 from app.fleet import service as fleet
@@ -25,7 +25,7 @@ def rehearsal_result(trials: Sequence[repository.GatedTrial], outcome: Outcome |
     Passed: at least FLIGHTS valid flights, or as many as the campaign's own rule took to end it; none of them aborted,
     invalid or lost, and none with gains that the gate refused.
     """
-    flown = [trial for trial in trials if trial.state in history.FLOWN]
+    flown = [trial for trial in trials if trial.state in FLOWN_TRIAL_STATES]
     if (spoilt := next((trial for trial in flown if trial.state in _FAILED_STATES), None)) is not None:
         return (
             "failed",

@@ -29,7 +29,7 @@ from app.campaigns.schemas import (
 from app.campaigns.statistics import best_trial
 from app.common.conflict_checks import allowed
 from app.common.schemas import Trouble
-from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
+from app.common.states import CAMPAIGN_ACTIONS, FLOWN_TRIAL_STATES, CampaignState, JobState, TrialState, VehicleState
 from app.core.definition import aborted_by_gains
 from app.core.experiments.base import Experiment
 from app.core.statistics.comparisons import Verdict
@@ -221,7 +221,7 @@ def _counts(trials: Sequence[TrialRow]) -> TrialCounts:
     states = Counter(trial.state for trial in trials)
     return TrialCounts(
         total=len(trials),
-        flown=sum(states[state] for state in history.FLOWN),
+        flown=sum(states[state] for state in FLOWN_TRIAL_STATES),
         valid=states[TrialState.VALID],
         aborted=states[TrialState.ABORTED],
         invalid=states[TrialState.INVALID],

@@ -17,7 +17,6 @@ _LABELS: Final[Mapping[str, str]] = {
 """States that a person knows by another word."""
 
 _REFUSALS: Final[Mapping[str, str]] = {
-    "abort": "cannot be aborted",
     "archive": "cannot be archived",
     "cancel": "cannot be cancelled",
     "check": "cannot be checked",
@@ -31,8 +30,6 @@ _REFUSALS: Final[Mapping[str, str]] = {
     "fly": "cannot be flown",
     "judge": "cannot be reviewed",
     "judge abort": "has no abort to review",
-    "land": "cannot be commanded to land",
-    "motors off": "cannot be commanded to stop its motors",
     "parameters": "cannot be asked for its parameters",
     "plan": "cannot have another flight planned",
     "propose": "cannot get a proposal",

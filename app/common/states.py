@@ -258,6 +258,9 @@ HISTORY_TRIAL_STATES: Final = frozenset({TrialState.VALID, TrialState.ABORTED})
 UNFLOWN_TRIAL_STATES: Final = frozenset({TrialState.PLANNED, TrialState.STAGED})
 """Trials that may still be flown or cancelled."""
 
+FLOWN_TRIAL_STATES: Final = HISTORY_TRIAL_STATES | {TrialState.CAPTURED, TrialState.INVALID, TrialState.LOST}
+"""Trials that have left the ground."""
+
 BUDGETED_TRIAL_STATES: Final = HISTORY_TRIAL_STATES | UNFLOWN_TRIAL_STATES | {TrialState.FLYING, TrialState.CAPTURED}
 """Trials that have used up, or may yet use up, a flight of the budget."""
 
@@ -269,9 +272,7 @@ TRIAL_ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
     "cancel": UNFLOWN_TRIAL_STATES,
     "abort": frozenset({TrialState.STAGED, TrialState.FLYING}),
     "upload": frozenset({TrialState.PLANNED, TrialState.LOST}),
-    "classify": frozenset(
-        {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
-    ),
+    "classify": FLOWN_TRIAL_STATES,
     "judge abort": frozenset({TrialState.ABORTED}),
     "note": frozenset(TrialState),
 }

@@ -18,6 +18,7 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.trials.schemas import GroupBrief
 from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
+from app.common.states import FLOWN_TRIAL_STATES
 from app.compare.schemas import (
     ComparedFlight,
     FlightComparison,
@@ -267,7 +268,7 @@ def _refusal(
         return f"there is no trial {trial_id}; its campaign may have been deleted"
     if trial_id in trial_ids[:index]:
         return f"flight {row.number} of campaign {row.campaign_id} is listed twice"
-    if row.state not in history.FLOWN:
+    if row.state not in FLOWN_TRIAL_STATES:
         return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
     first = next(found[other] for other in trial_ids if other in found)
     own, wanted = experiments[row.campaign_id], experiments[first.campaign_id]

@@ -15,13 +15,12 @@ from app import __version__
 from app.autopilots.registry import EXPERIMENTS
 from app.campaigns import figure_data
 from app.campaigns import service as campaigns
-from app.campaigns.history import FLOWN
 from app.campaigns.schemas import Campaign, Start, StopRule
 from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.trials import service as trials_service
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
-from app.common.states import AbortCause
+from app.common.states import FLOWN_TRIAL_STATES, AbortCause
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
@@ -291,7 +290,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     return Report(
         campaign=campaign,
         statistics=statistics,
-        flown=tuple(trial for trial in trials if trial.state in FLOWN),
+        flown=tuple(trial for trial in trials if trial.state in FLOWN_TRIAL_STATES),
         experiment=experiment,
         what=describe_vehicle(campaign, experiment, vehicle.identity, safe_gains),
         how=describe_method(campaign, experiment),
