@@ -30,7 +30,6 @@ from app.db.earlier_ends import give_end
 from app.vehicles.flight_end import FlightEnd
 from app.vehicles.registry import IMPORT
 
-FORMAT: Final = "gainline-campaign"
 VERSION: Final = 6
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"

@@ -14,7 +14,6 @@ from sqlalchemy.orm import Session
 from app import __version__
 from app.bundles.contents import (
     CONTENTS,
-    FORMAT,
     MANIFEST,
     MAX_CAMPAIGNS,
     VERSION,
@@ -70,7 +69,7 @@ class Packer:
                 ) from error
             self._write(CONTENTS, _json(contents.model_dump(mode="json")), squeeze=True)
             manifest = Manifest(
-                format=FORMAT, version=VERSION, program=__version__, made_at=utc_now(), parts=self._digests
+                format="gainline-campaign", version=VERSION, program=__version__, made_at=utc_now(), parts=self._digests
             )
             self._write(MANIFEST, _json(manifest.model_dump(mode="json")), squeeze=True)
         self._verify()

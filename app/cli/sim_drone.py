@@ -1,8 +1,8 @@
 """`gainline sim-drone`: a simulated drone that speaks MAVLink like a real autopilot."""
 
 import signal
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack, closing
 
 from app.autopilots.simulated_kinds import SIMULATED
 from app.cli.console import console
@@ -57,8 +57,9 @@ def run_sim_drone(
         if seen_at is not None:
             out.print(f"Motion capture: {seen_at}.")
         out.print(f"Simulated time runs at {speed:g} times real time. Press Ctrl-C to stop.")
-        with _stopped_by_signals(server):
-            server.run()
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, lambda *_: server.stop())
+        server.run()
         if server.lost_s > 0.0:
             out.print(f"This computer was too slow: the drone's clock is {server.lost_s:.1f} s behind.")
 
@@ -97,13 +98,3 @@ def _options(settings: Sequence[str]) -> dict[str, float]:
                 hint="For example --set wind_m_s=3; docs/vehicles.md lists the settings of jsbsim and twin.",
             ) from error
     return options
-
-
-@contextmanager
-def _stopped_by_signals(server: Server) -> Iterator[None]:
-    before = {number: signal.signal(number, lambda *_: server.stop()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -27,7 +27,7 @@ def unlock(settings: Settings, *, script: bool) -> None:
     Raises UnavailableError when no server runs on the data folder, StorageError when its secret cannot be read.
     """
     address, system = _running(settings)
-    keyring = Keyring.open(settings.data_dir)
+    keyring = Keyring(settings.data_dir)
     if script:
         _say("For scripts on this computer:", [keyring.value(Key.SCRIPT)])
         if system.is_exposed:

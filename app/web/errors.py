@@ -202,10 +202,7 @@ _REASONS: Final[Mapping[str, str]] = {
 """By the validator's type of error, with its limits."""
 
 _ABOUT_FIELDS: Final = frozenset({"extra_forbidden", "model_type", "model_attributes_type"})
-_QUOTED: Final = frozenset(name for name in _REASONS if name not in {"missing", "extra_forbidden"}) - {
-    "string_too_short",
-    "string_too_long",
-}
+_QUOTED: Final = _REASONS.keys() - {"missing", "extra_forbidden", "string_too_short", "string_too_long"}
 
 
 def reason_of(found: Mapping[str, Any], schema: object = None) -> str:

@@ -218,6 +218,4 @@ def upload_trajectory(
 def add_photo(upload: Record, trial_id: Id) -> TrialPhoto:
     """Add a photo (JPEG, PNG or WebP, detected by its content; at most 10 MiB) to a flight, as the form field
     `file`."""
-    upload.file.seek(0)
-    content = upload.file.read(photos.MAX_BYTES + 1)
-    return upload.once(lambda session: photos.add_photo(session, trial_id, content))
+    return upload.once(lambda session: photos.add_photo(session, trial_id, upload.content()))
