@@ -49,7 +49,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         require_current(settings.database_file)
-        app.state.keyring = Keyring.open(settings.data_dir)
+        app.state.keyring = Keyring(settings.data_dir)
         async with live_link(settings.data_dir, database) as live:
             app.state.live = live
             yield

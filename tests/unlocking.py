@@ -20,7 +20,7 @@ def client_here(application: FastAPI) -> TestClient:
 
 def new_link(data_dir: Path) -> str:
     """The path and query of a link."""
-    return f"/unlock?token={Keyring.open(data_dir).new_link()}"
+    return f"/unlock?token={Keyring(data_dir).new_link()}"
 
 
 def unlock(client: httpx2.Client) -> None:

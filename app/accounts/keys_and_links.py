@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, Self
+from typing import Final
 
 from app.accounts.permissions import Key
 from app.common.errors import StorageError
@@ -30,29 +30,25 @@ _SECRET_BYTES: Final = 32
 class Keyring:
     """The keys of one data folder. Several processes may have it open."""
 
-    def __init__(self, folder: Path, secret: bytes, *, now_s: Callable[[], float] = time.time) -> None:
-        self._links = folder / "links"
-        self._secret = secret
-        self._now_s = now_s
-        self._values = {self.value(key): key for key in (Key.REMOTE, Key.SCRIPT, Key.BROWSER)}
-        self.cookie = f"gainline-{self._derived('cookie')[:8]}"
-        """Name of the browser's cookie, different for each data folder: browsers share cookies between the ports of a
-        host, and several servers may run."""
-
-    @classmethod
-    def open(cls, data_dir: Path, *, now_s: Callable[[], float] = time.time) -> Self:
+    def __init__(self, data_dir: Path, *, now_s: Callable[[], float] = time.time) -> None:
         """Open the data folder's keyring; create it if there is none. Raises StorageError when that fails."""
         folder = data_dir / "access"
+        self._links = folder / "links"
+        self._now_s = now_s
         try:
             folder.mkdir(mode=0o700, exist_ok=True)
-            (folder / "links").mkdir(mode=0o700, exist_ok=True)
-            return cls(folder, _secret(folder / "secret"), now_s=now_s)
+            self._links.mkdir(mode=0o700, exist_ok=True)
+            self._secret = _secret(folder / "secret")
         except OSError as error:
             raise StorageError(
                 f"The folder {folder}, which holds this server's secret, cannot be used: {error.strerror}.",
                 hint="Give this user read and write permission for it. Or stop Gainline and delete it; every "
                 "browser must then be unlocked again.",
             ) from error
+        self._values = {self.value(key): key for key in (Key.REMOTE, Key.SCRIPT, Key.BROWSER)}
+        self.cookie = f"gainline-{self._derived('cookie')[:8]}"
+        """Name of the browser's cookie, different for each data folder: browsers share cookies between the ports of a
+        host, and several servers may run."""
 
     def value(self, key: Key) -> str:
         """Value of a browser's cookie or a script's header that presents this key."""

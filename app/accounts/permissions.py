@@ -13,13 +13,6 @@ from typing import Final
 from app.common.errors import NotAllowedError
 
 
-class RequestOrigin(Enum):
-    """Where a request comes from."""
-
-    HERE = "here"
-    ELSEWHERE = "elsewhere"
-
-
 class Key(IntEnum):
     """The key that a caller has presented; each permits more than those before it."""
 
@@ -75,12 +68,15 @@ PERMISSION_RULES: Final[Mapping[Permission, Rule]] = {
 @dataclass(frozen=True, slots=True)
 class Caller:
     """The sender of a request. `exposed`: the server listens beyond loopback. `because`: why the caller counts as
-    elsewhere."""
+    elsewhere, empty for one on this computer."""
 
-    place: RequestOrigin = RequestOrigin.HERE
     key: Key = Key.NONE
     exposed: bool = False
     because: str = ""
+
+    @property
+    def is_elsewhere(self) -> bool:
+        return bool(self.because)
 
 
 COMMAND_LINE: Final = Caller(key=Key.BROWSER)
@@ -101,7 +97,7 @@ def is_allowed(act: Permission, caller: Caller) -> bool:
     rule = PERMISSION_RULES[act]
     if caller.exposed and not rule.exposed:
         return False
-    needed = rule.here if caller.place is RequestOrigin.HERE else rule.elsewhere
+    needed = rule.elsewhere if caller.is_elsewhere else rule.here
     return needed is not None and caller.key >= needed
 
 
@@ -116,14 +112,14 @@ def require(act: Permission, caller: Caller, vehicle: str = "") -> None:
             f"{vehicle} cannot be commanded from this server: it is {because}, and other devices can reach the server.",
             hint="Start the server with --host 127.0.0.1 on the computer that has the link to the vehicle.",
         )
-    if caller.place is RequestOrigin.ELSEWHERE and rule.elsewhere is None:
+    if caller.is_elsewhere and rule.elsewhere is None:
         raise NotAllowedError(
             f"{vehicle} is {because}: it accepts commands from this computer only, and the request came "
             f"{caller.because}.",
             hint="Use a browser on the computer that runs Gainline, at the address that the terminal printed, "
             "without a proxy or tunnel.",
         )
-    if caller.place is RequestOrigin.ELSEWHERE:
+    if caller.is_elsewhere:
         raise NotAllowedError(
             f"This browser has read-only access, because the request came {caller.because}.",
             hint=UNLOCK_HINT,

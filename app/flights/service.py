@@ -6,7 +6,7 @@ from contextlib import suppress
 
 from sqlalchemy.orm import Session
 
-from app.accounts.permissions import LOCAL_CLI, RequestContext, RequestOrigin
+from app.accounts.permissions import LOCAL_CLI, RequestContext
 from app.campaigns import history, rehearsals
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.trials import service as trials
@@ -184,7 +184,7 @@ def _requester(vehicle: VehicleRow, context: RequestContext) -> Requester:
     """Who makes a request that is open to everyone."""
     if is_in_control(vehicle, context):
         return Requester.OPERATOR
-    if context.caller.place is RequestOrigin.ELSEWHERE:
+    if context.caller.is_elsewhere:
         return Requester.DEVICE
     return Requester.BROWSER if context.from_our_page else Requester.SCRIPT
 

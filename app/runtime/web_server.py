@@ -114,7 +114,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
     application = create_app(settings)
     with application.state.database.read() as session:
         latest_event_id(session)  # a start-up error is raised here, and not in the event loop
-    Keyring.open(settings.data_dir)
+    Keyring(settings.data_dir)
     address = web_address(settings.host, listener.getsockname()[1])
 
     def ready() -> None:

@@ -17,7 +17,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.accounts.keys_and_links import Keyring
-from app.accounts.permissions import Caller, Key, Permission, RequestOrigin, require
+from app.accounts.permissions import Caller, Key, Permission, require
 from app.common.errors import ForeignRequestError, NotAllowedError
 from app.common.settings import is_loopback
 from app.web.errors import problem_response
@@ -75,13 +75,11 @@ def _require_admitted(request: Request) -> None:
 
 def caller_of(request: Request) -> Caller:
     """The caller of a request."""
-    because = _describe_origin(request)
     keyring: Keyring = request.app.state.keyring
     return Caller(
-        place=RequestOrigin.ELSEWHERE if because else RequestOrigin.HERE,
         key=max(map(keyring.key_of, _shown(request.headers, keyring.cookie)), default=Key.NONE),
         exposed=not is_loopback(request.app.state.settings.host),
-        because=because,
+        because=_describe_origin(request),
     )
 
 

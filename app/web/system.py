@@ -11,7 +11,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, StreamingResponse
 
 from app import __version__
 from app.accounts.keys_and_links import LINK_VALID_S, Keyring
-from app.accounts.permissions import UNLOCK_HINT, Key, Permission, RequestOrigin, is_allowed
+from app.accounts.permissions import UNLOCK_HINT, Key, Permission, is_allowed
 from app.common.data_folder import folder_bytes
 from app.common.errors import InputError, Problem
 from app.common.schemas import Schema
@@ -139,10 +139,9 @@ def get_access(request: Request) -> Access:
     """What this client may do."""
     caller = caller_of(request)
     may_change, may_command = is_allowed(Permission.CHANGE, caller), is_allowed(Permission.TAKE_OFF, caller)
-    elsewhere = caller.place is RequestOrigin.ELSEWHERE
-    link_helps = caller.key < Key.REMOTE if elsewhere else not caller.exposed
+    link_helps = caller.key < Key.REMOTE if caller.is_elsewhere else not caller.exposed
     return Access(
-        elsewhere=elsewhere,
+        elsewhere=caller.is_elsewhere,
         may_change=may_change,
         may_link=is_allowed(Permission.LINK, caller),
         may_command=may_command,
@@ -155,7 +154,7 @@ def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") 
     """Exchange a link's token for a cookie, once. What the cookie permits depends on where the browser is."""
     keyring: Keyring = request.app.state.keyring
     caller = caller_of(request)
-    given = Key.BROWSER if caller.place is RequestOrigin.HERE else Key.REMOTE
+    given = Key.REMOTE if caller.is_elsewhere else Key.BROWSER
     if not keyring.open_link(token):
         if caller.key >= given:  # the link was opened twice in the same browser
             return RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)

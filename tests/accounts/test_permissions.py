@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from app.accounts.permissions import Caller, Key, Permission, RequestOrigin, is_allowed, require
+from app.accounts.permissions import Caller, Key, Permission, is_allowed, require
 from app.common.errors import NotAllowedError
 
 ELSEWHERE = "from another device (192.0.2.9)"
@@ -21,15 +21,15 @@ NEEDED = {
 
 
 @pytest.mark.parametrize(
-    ("act", "place", "key", "exposed"), [*itertools.product(Permission, RequestOrigin, Key, [False, True])]
+    ("act", "because", "key", "exposed"), [*itertools.product(Permission, ["", ELSEWHERE], Key, [False, True])]
 )
 def test_permissions_follow_the_domain_and_refusals_give_the_reason(
-    act: Permission, place: RequestOrigin, key: Key, exposed: bool
+    act: Permission, because: str, key: Key, exposed: bool
 ) -> None:
     here, elsewhere, where_others_are = NEEDED[act]
-    needed = here if place is RequestOrigin.HERE else elsewhere
+    needed = elsewhere if because else here
     expected = needed is not None and key >= needed and (where_others_are or not exposed)
-    caller = Caller(place, key, exposed, "" if place is RequestOrigin.HERE else ELSEWHERE)
+    caller = Caller(key, exposed, because)
     assert is_allowed(act, caller) == expected
     if expected:
         require(act, caller, "Bee")
@@ -52,6 +52,6 @@ def test_a_refusal_names_the_vehicle_and_the_way_out() -> None:
     assert "Bearer" not in locked.value.hint, "a page shows the hint"
     assert "Bearer" in locked.value.script_hint
     with pytest.raises(NotAllowedError, match=r"from another device \(192.0.2.9\)"):
-        require(Permission.REAL, Caller(RequestOrigin.ELSEWHERE, Key.BROWSER, because=ELSEWHERE), "Bee")
+        require(Permission.REAL, Caller(Key.BROWSER, because=ELSEWHERE), "Bee")
     with pytest.raises(NotAllowedError, match="other devices can reach the server"):
         require(Permission.LINK, Caller(key=Key.BROWSER, exposed=True), "Bee")

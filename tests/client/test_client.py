@@ -71,7 +71,7 @@ def test_a_script_with_its_token_plans_on_a_real_vehicle_and_is_refused_in_words
     with pytest.raises(NotAllowedError, match="gainline unlock --script") as refused:
         Client(http=client).fly(campaign["id"], {"kp": 300, "ki": 20, "kd": 90})
     assert (refused.value.status, refused.value.title) == (403, "Not allowed")
-    script = Client(http=client, token=Keyring.open(settings.data_dir).value(Key.SCRIPT))
+    script = Client(http=client, token=Keyring(settings.data_dir).value(Key.SCRIPT))
     with pytest.raises(NotAllowedError, match="only its operator can start the takeoff"):
         script.fly(campaign["id"], {"kp": 300, "ki": 20, "kd": 90})
     assert script.ask(campaign["id"]).kind == "start"

@@ -60,7 +60,7 @@ SCRIPTS = (*FROM_AFAR, "another user", "another user without headers")
 def test_the_scripts_that_flew_a_real_vehicle_are_refused(serving: Serving, bee: int, name: str, stolen: bool) -> None:
     """Those from afar also with the operator's own key."""
     headers = script(name, int(serving.url.rpartition(":")[2]))
-    keyring = Keyring.open(serving.data_dir)
+    keyring = Keyring(serving.data_dir)
     if stolen:
         headers["Cookie"] = f"{keyring.cookie}={keyring.value(Key.BROWSER)}"
     steps = [
@@ -145,7 +145,7 @@ def test_without_a_server_there_is_no_link(tmp_path: Path) -> None:
 
 
 def test_no_token_is_in_the_logs(serving: Serving) -> None:
-    token = Keyring.open(serving.data_dir).new_link()
+    token = Keyring(serving.data_dir).new_link()
     with httpx2.Client(timeout=Waits.at_most_s, base_url=serving.url) as browser:
         assert browser.get(f"/unlock?token={token}").status_code == 303
         assert browser.get(f"/unlock?token={token}").status_code == 303

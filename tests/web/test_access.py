@@ -58,7 +58,7 @@ def real(client: TestClient, database: Database) -> Json:
 
 
 def bearer(settings: Settings, key: Key) -> dict[str, str]:
-    return {"Authorization": f"Bearer {Keyring.open(settings.data_dir).value(key)}"}
+    return {"Authorization": f"Bearer {Keyring(settings.data_dir).value(key)}"}
 
 
 def test_before_a_link_is_opened_a_browser_may_do_all_but_command_real_vehicles(client: TestClient) -> None:
@@ -121,7 +121,7 @@ def test_a_campaign_on_a_real_vehicle_is_changed_with_a_key_only(
 
 
 def test_a_cookie_that_somebody_put_beside_ours_does_not_hide_it(client: TestClient, settings: Settings) -> None:
-    keyring = Keyring.open(settings.data_dir)
+    keyring = Keyring(settings.data_dir)
     name, value = keyring.cookie, keyring.value(Key.BROWSER)
     for cookies in (f"{name}=x; {name}={value}", f"{name}={value}; {name}=x"):
         assert client.get("/api/access", headers={"Cookie": cookies}).json()["may_command"]
