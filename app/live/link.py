@@ -22,16 +22,14 @@ import structlog
 from app.core.errors import GainlineError, InputError
 from app.live.messages import (
     MAX_LINE_BYTES,
-    Abort,
     Answer,
     FromWorker,
     Message,
-    Ping,
     PublishedMessage,
+    Request,
+    RequestKind,
     Telemetry,
-    ToWorker,
     VehicleCommandKind,
-    VehicleOrder,
     VehicleStatus,
     WorkerHello,
     decode,
@@ -124,38 +122,36 @@ class LiveServer:
             writer.close()
 
     def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
-        match decode(line):
-            case Abort(request=request, trial_id=trial_id, reason=reason, by_s=by_s):
-                accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
-                answer = Answer(request=request, accepted=accepted)
-                _log.info("abort requested", trial_id=trial_id, reason=reason, accepted=accepted)
-            case VehicleOrder() as ordered:
-                task = self._loop.create_task(self._pass_on(ordered, writer))
+        asked = decode(line)
+        if not isinstance(asked, Request):
+            raise InputError(
+                f"A client sent {asked.type!r}, which only the worker may send.",
+                hint="Connect to the worker's socket with Gainline only.",
+            )
+        match asked.kind:
+            case "ping":
+                answer = Answer(request=asked.request)
+            case "abort":
+                accepted = _is_in_time(asked.by_s) and self._abort(asked.of, asked.reason)
+                answer = Answer(request=asked.request, accepted=accepted)
+                _log.info("abort requested", trial_id=asked.of, reason=asked.reason, accepted=accepted)
+            case order:
+                task = self._loop.create_task(self._pass_on(asked, order, writer))
                 self._orders.add(task)
                 task.add_done_callback(self._orders.discard)
                 return
-            case Ping(request=request):
-                answer = Answer(request=request)
-            case other:
-                raise InputError(
-                    f"A client sent {other.type!r}, which only the worker may send.",
-                    hint="Connect to the worker's socket with Gainline only.",
-                )
         writer.write(encode(answer))
 
-    async def _pass_on(self, ordered: VehicleOrder, writer: asyncio.StreamWriter) -> None:
+    async def _pass_on(self, asked: Request, order: VehicleCommandKind, writer: asyncio.StreamWriter) -> None:
         """Forward a command and send the answer: when the vehicle's process answers, or shortly after the deadline if
         it does not."""
         problem = LATE
-        if _is_in_time(ordered.by_s):
-            forwarded = asyncio.wrap_future(
-                self._order(ordered.vehicle_id, ordered.order, ordered.reason, ordered.by_s)
-            )
-            await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
+        if _is_in_time(asked.by_s):
+            forwarded = asyncio.wrap_future(self._order(asked.of, order, asked.reason, asked.by_s))
+            await asyncio.wait({forwarded}, timeout=asked.by_s + CONFIRMATION_S - time.monotonic())
             problem = forwarded.result() if forwarded.done() else UNCONFIRMED
-        vehicle_id = ordered.vehicle_id
-        _log.info("vehicle command", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
-        writer.write(encode(Answer(request=ordered.request, accepted=not problem, problem=problem)))
+        _log.info("vehicle command", vehicle_id=asked.of, order=order, reason=asked.reason, problem=problem)
+        writer.write(encode(Answer(request=asked.request, accepted=not problem, problem=problem)))
 
     def _send_all(self, message: FromWorker) -> None:
         line = encode(message)
@@ -208,7 +204,7 @@ class LiveClient:
             await asyncio.sleep(PING_EVERY_S)
             if self.connected:
                 try:
-                    await self._ask(Ping(request=next(self._numbers)))
+                    await self._ask("ping")
                     answers = True
                 except LinkDownError:
                     answers = False
@@ -230,29 +226,26 @@ class LiveClient:
     async def abort(self, trial_id: int, reason: str) -> Answer:
         """Request that the worker aborts a flight, without the database, and wait for its answer. Raises
         LinkDownError when it cannot be reached."""
-        number = next(self._numbers)
-        return await self._ask(Abort(request=number, trial_id=trial_id, reason=reason, by_s=_deadline_s()))
+        return await self._ask("abort", trial_id, reason)
 
     async def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> Answer:
         """Request that the worker lands a vehicle or stops its motors. Raises LinkDownError as `abort` does."""
-        number = next(self._numbers)
-        return await self._ask(
-            VehicleOrder(request=number, vehicle_id=vehicle_id, order=order, reason=reason, by_s=_deadline_s())
-        )
+        return await self._ask(order, vehicle_id, reason)
 
-    async def _ask(self, question: ToWorker) -> Answer:
+    async def _ask(self, kind: RequestKind, of: int = 0, reason: str = "") -> Answer:
         if self._writer is None:
             raise _link_down("no worker is running")
         answered: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
-        self._waiting[question.request] = answered
-        self._writer.write(encode(question))
+        number, by_s = next(self._numbers), time.monotonic() + ORDER_TIMEOUT_S
+        self._waiting[number] = answered
+        self._writer.write(encode(Request(request=number, kind=kind, of=of, reason=reason, by_s=by_s)))
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT_S):  # wait_for can swallow a cancellation in Python 3.11
                 return await answered
         except TimeoutError as error:
             raise _link_down(f"the worker did not answer within {ANSWER_TIMEOUT_S:g} s") from error
         finally:
-            del self._waiting[question.request]
+            del self._waiting[number]
 
     async def _listen(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -271,7 +264,7 @@ class LiveClient:
             case Answer(request=request):
                 if (answer := self._waiting.get(request)) is not None and not answer.done():
                     answer.set_result(message)
-            case Abort() | VehicleOrder() | Ping():
+            case Request():
                 raise InputError(f"The worker sent an unexpected message: {message.type}.", hint="Restart the worker.")
             case _:
                 self._on_message(message)
@@ -285,10 +278,6 @@ class LiveClient:
             writer.close()
         if was_up:
             self._on_link(False)
-
-
-def _deadline_s() -> float:
-    return time.monotonic() + ORDER_TIMEOUT_S
 
 
 def _link_down(why: str) -> LinkDownError:

@@ -27,6 +27,7 @@ SILENT_AFTER_S: Final = 2.0
 five times a second, has not reported it for this long."""
 VehicleLinkState = Literal["connecting", "connected", "gone", "not answering"]
 VehicleCommandKind = Literal["land", "motors off"]
+RequestKind = Literal["ping", "abort"] | VehicleCommandKind
 UnreadyReason = Literal["", "link silent", "gains unknown"]
 """Why a vehicle on the ground is not ready, as its own process sees it: nothing was received from it for 2 s, or
 the staged gains have not been read again since; or its gains are unknown, since it restarted."""
@@ -90,39 +91,20 @@ class WorkerHello:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Abort:
-    """Request to the worker: end this trial's flight now, with the safe gains restored. The answer carries the same
-    `request`.
+class Request:
+    """Request to the worker, whose answer carries the same number: only to answer, which a worker that hangs does not;
+    to end the flight of the trial `of` now, with the safe gains restored; or to land the vehicle `of`, or stop its
+    motors at any height, now and whatever it is doing.
 
     Not carried out after `by_s` of this computer's monotonic clock, s; the answer then says so.
     """
 
     request: int
-    trial_id: int
+    kind: RequestKind
+    of: int
     reason: str
     by_s: float
-    type: Literal["abort"] = "abort"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleOrder:
-    """Request to the worker: land this vehicle, or stop its motors at any height, now and whatever it is doing.
-    `request` and `by_s` as in `Abort`."""
-
-    request: int
-    vehicle_id: int
-    order: VehicleCommandKind
-    reason: str
-    by_s: float
-    type: Literal["order"] = "order"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ping:
-    """Request that a worker that hangs does not answer."""
-
-    request: int
-    type: Literal["ping"] = "ping"
+    type: Literal["request"] = "request"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,8 +122,7 @@ class Answer:
 PublishedMessage = Telemetry | FlightPhase | VehicleStatus
 """Messages that the event streams pass on unchanged."""
 FromWorker = PublishedMessage | WorkerHello | Answer
-ToWorker = Abort | VehicleOrder | Ping
-Message = FromWorker | ToWorker
+Message = FromWorker | Request
 
 
 @cache

@@ -21,15 +21,13 @@ from app.live.hub import live_link
 from app.live.link import SLOW_CLIENT_BYTES, LinkDownError, LiveClient, LiveServer
 from app.live.messages import (
     LONGEST_PATH_BYTES,
-    Abort,
     Answer,
     FlightPhase,
     FromWorker,
-    Ping,
     PublishedMessage,
+    Request,
     Telemetry,
     VehicleCommandKind,
-    VehicleOrder,
     VehicleStatus,
     WorkerHello,
     decode,
@@ -211,10 +209,8 @@ def test_a_late_command_is_not_executed(tmp_path: Path) -> None:
         reader = web.makefile("rb")
         reader.readline()
         for request, (by_s, reason) in enumerate(((late_s, "late"), (early_s, "in time"))):
-            web.sendall(encode(Abort(request=request, trial_id=2, reason=f"abort {reason}", by_s=by_s)))
-            web.sendall(
-                encode(VehicleOrder(request=10 + request, vehicle_id=5, order="motors off", reason=reason, by_s=by_s))
-            )
+            web.sendall(encode(Request(request=request, kind="abort", of=2, reason=f"abort {reason}", by_s=by_s)))
+            web.sendall(encode(Request(request=10 + request, kind="motors off", of=5, reason=reason, by_s=by_s)))
         answers = [decode(reader.readline()) for _ in range(4)]
     accepted = {answer.request: answer.accepted for answer in answers if isinstance(answer, Answer)}
     assert accepted == {0: False, 10: False, 1: True, 11: True}
@@ -362,7 +358,9 @@ def test_the_web_process_ends_while_a_worker_owes_it_an_answer(tmp_path: Path, m
 
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             writer.write(encode(WorkerHello()))
-            assert isinstance(decode(await reader.readline()), Ping)
+            asked = decode(await reader.readline())
+            assert isinstance(asked, Request)
+            assert asked.kind == "ping"
             owing.set()
             await reader.read()
             writer.close()
