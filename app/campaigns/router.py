@@ -30,14 +30,13 @@ from app.fleet import registration
 from app.fleet.schemas import Vehicle, VehicleEdit
 from app.web.dependencies import (
     CurrentDatabase,
-    CursorText,
     Id,
     IdempotentPost,
-    Limit,
     Reader,
     ReadVersion,
     RequestContextDep,
     Theme,
+    WantedPart,
     Writer,
     json_only,
     of_app,
@@ -49,17 +48,14 @@ router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[De
 @router.get("")
 def list_campaigns(
     session: Reader,
+    part: WantedPart,
     search: Annotated[str, Query(max_length=200, description="part of the name")] = "",
     state: Annotated[list[CampaignState] | None, Query()] = None,
     vehicle: Annotated[list[str] | None, Query(description="kinds of vehicle")] = None,
     sort: Sort = Sort.NEWEST,
-    limit: Limit = 50,
-    cursor: CursorText = None,
 ) -> Page[CampaignSummary]:
     """Campaigns as summaries for the list."""
-    return service.list_campaigns(
-        session, search=search, states=state or [], vehicles=vehicle or [], sort=sort, limit=limit, cursor=cursor
-    )
+    return service.list_campaigns(session, part, search=search, states=state or [], vehicles=vehicle or [], sort=sort)
 
 
 @router.post("", status_code=status.HTTP_201_CREATED)

@@ -40,7 +40,7 @@ from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.formatting import confidence_text, format_gains, named_flights
 from app.db.base import added
 from app.db.models import CampaignRow, RehearsalRow
-from app.db.pages import page_of
+from app.db.pages import Part, page_of
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.fleet.registration import promote_gains
@@ -52,17 +52,16 @@ _DIGITS_OF_AN_ID: Final = 19
 
 def list_campaigns(
     session: Session,
+    part: Part,
     *,
     search: str,
     states: Collection[CampaignState],
     vehicles: Collection[str],
     sort: Sort,
-    limit: int,
-    cursor: str | None,
 ) -> Page[CampaignSummary]:
     """One page of summaries. Raises InputError for a cursor of another list."""
     wanted, order = repository.campaigns_wanted(search, states, vehicles), repository.ORDERS[sort]
-    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=partial(summaries, session))
+    return page_of(session, wanted, order, part, partial(summaries, session))
 
 
 def get_row(session: Session, campaign_id: int) -> CampaignRow:

@@ -22,6 +22,14 @@ R = TypeVar("R", bound=Reported | Row[Any])
 V = TypeVar("V")
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which part of a list is wanted: at most `limit` rows after a `cursor`, else from the beginning."""
+
+    limit: int
+    cursor: str | None = None
+
+
 @cache
 def _cursor_of(kind: Any) -> TypeAdapter[tuple[str, Any, int]]:
     """Reader of cursors of an order by values of this kind."""
@@ -64,23 +72,17 @@ def _refused(reason: str) -> InputError:
 
 
 def page_of(
-    session: Session,
-    wanted: Select[R],
-    order: Order,
-    *,
-    cursor: str | None,
-    limit: int,
-    view: Callable[[Sequence[R]], list[V]],
+    session: Session, wanted: Select[R], order: Order, part: Part, view: Callable[[Sequence[R]], list[V]]
 ) -> Page[V]:
     """One page of the `wanted` rows, as `view` shows them. Raises InputError for a cursor of another list."""
     total = session.scalar(wanted.with_only_columns(func.count(), maintain_column_froms=True)) or 0
     value, identity = order.value, wanted.selected_columns["id"]
-    if cursor is not None:
-        at, after_id = order.position_of(cursor)
+    if part.cursor is not None:
+        at, after_id = order.position_of(part.cursor)
         here, there = tuple_(value, identity), tuple_(literal(at, value.type), literal(after_id))
         wanted = wanted.where(here < there if order.descending else here > there)
     directed = (value.desc(), identity.desc()) if order.descending else (value, identity)
-    found = session.execute(wanted.add_columns(value).order_by(*directed).limit(limit + 1)).all()
-    rows = [row for row, _ in found[:limit]]
-    following = order.cursor_at(found[limit - 1][1], rows[-1].id) if len(found) > limit else None
+    found = session.execute(wanted.add_columns(value).order_by(*directed).limit(part.limit + 1)).all()
+    rows = [row for row, _ in found[: part.limit]]
+    following = order.cursor_at(found[part.limit - 1][1], rows[-1].id) if len(found) > part.limit else None
     return Page(items=view(rows), total=total, next_cursor=following)

@@ -23,8 +23,6 @@ RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 
 T = TypeVar("T", FlightRow, VehicleActRow)
 
-EVERY_VEHICLE: Final = select(VehicleRow)
-
 
 def get_one(session: Session, vehicle_id: int) -> VehicleRow:
     """The vehicle with that id. Raises NotFoundError."""

@@ -23,14 +23,13 @@ from app.fleet.schemas import (
 from app.live.messages import NO_LINK
 from app.web.dependencies import (
     CurrentDatabase,
-    CursorText,
     Id,
     IdempotentPost,
-    Limit,
     Live,
     Reader,
     ReadVersion,
     RequestContextDep,
+    WantedPart,
     Writer,
     json_only,
 )
@@ -39,9 +38,9 @@ router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depe
 
 
 @router.get("")
-def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None) -> Page[Vehicle]:
+def list_vehicles(session: Reader, part: WantedPart) -> Page[Vehicle]:
     """Every registered vehicle, and every shared simulation that a campaign has used."""
-    return service.list_vehicles(session, limit=limit, cursor=cursor)
+    return service.list_vehicles(session, part)
 
 
 @router.post("", status_code=status.HTTP_201_CREATED)
@@ -97,15 +96,15 @@ def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: 
 
 
 @router.get("/{vehicle_id}/acts")
-def list_acts(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[VehicleAct]:
+def list_acts(session: Reader, vehicle_id: Id, part: WantedPart) -> Page[VehicleAct]:
     """Acts of the vehicle, newest first: requests outside its flights."""
-    return views.acts_view(session, vehicle_id, limit=limit, cursor=cursor)
+    return views.acts_view(session, vehicle_id, part)
 
 
 @router.get("/{vehicle_id}/ledger")
-def list_given_gains(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[GivenGains]:
+def list_given_gains(session: Reader, vehicle_id: Id, part: WantedPart) -> Page[GivenGains]:
     """Every gain set that the vehicle was given, newest first: in flights, restored after them, and by acts."""
-    return views.ledger_view(session, vehicle_id, limit=limit, cursor=cursor)
+    return views.ledger_view(session, vehicle_id, part)
 
 
 @router.post("/{vehicle_id}/land", status_code=status.HTTP_202_ACCEPTED)

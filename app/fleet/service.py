@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Final
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.autopilots.registry import offered
@@ -18,7 +19,7 @@ from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, Veh
 from app.core.policy import Gains
 from app.db.base import added, utc_now
 from app.db.models import CampaignRow, VehicleActRow, VehicleRow
-from app.db.pages import Order, page_of
+from app.db.pages import Order, Part, page_of
 from app.figures.vehicle_history import BatteryFlight
 from app.fleet import repository
 from app.fleet.control import control_of
@@ -273,16 +274,10 @@ def options_of(row: CampaignRow) -> dict[str, OptionValue]:
     return settings_of(row.vehicle) if row.vehicle.registered else dict(row.vehicle_options)
 
 
-def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[Vehicle]:
+def list_vehicles(session: Session, part: Part) -> Page[Vehicle]:
     """Page of vehicles in the order in which they were registered or first used."""
-    return page_of(
-        session,
-        repository.EVERY_VEHICLE,
-        Order("id", VehicleRow.id.expression),
-        cursor=cursor,
-        limit=limit,
-        view=lambda rows: [vehicle_view(row) for row in rows],
-    )
+    by_id = Order("id", VehicleRow.id.expression)
+    return page_of(session, select(VehicleRow), by_id, part, lambda rows: [vehicle_view(row) for row in rows])
 
 
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:

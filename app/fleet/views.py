@@ -19,7 +19,7 @@ from app.common.states import (
     TrialState,
 )
 from app.db.models import FlightRow, VehicleActRow, VehicleRow
-from app.db.pages import Order, page_of
+from app.db.pages import Order, Part, page_of
 from app.fleet import repository
 from app.fleet.schemas import GivenGains, VehicleAct
 from app.vehicles.flight_end import end_text
@@ -49,17 +49,11 @@ def _command_outcome(kind: ActKind, flight: FlightRow) -> tuple[ActState, str]:
     return ActState.REQUESTED if flight.state == FlightState.REQUESTED else ActState.RUNNING, ""
 
 
-def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
+def acts_view(session: Session, vehicle_id: int, part: Part) -> Page[VehicleAct]:
     """Page of acts, newest first. Raises NotFoundError."""
     repository.get_one(session, vehicle_id)
-    return page_of(
-        session,
-        repository.acts_of(vehicle_id),
-        Order("-id", VehicleActRow.id.expression, descending=True),
-        cursor=cursor,
-        limit=limit,
-        view=partial(_act_views, session),
-    )
+    newest_first = Order("-id", VehicleActRow.id.expression, descending=True)
+    return page_of(session, repository.acts_of(vehicle_id), newest_first, part, partial(_act_views, session))
 
 
 def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleAct]:
@@ -68,11 +62,11 @@ def _act_views(session: Session, rows: Sequence[VehicleActRow]) -> list[VehicleA
     return [_act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows]
 
 
-def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
+def ledger_view(session: Session, vehicle_id: int, part: Part) -> Page[GivenGains]:
     """Page of the gain sets that the vehicle was given, newest first. Raises NotFoundError."""
     vehicle = repository.get_one(session, vehicle_id)
     wanted, order = repository.ledger(vehicle_id)
-    return page_of(session, wanted, order, cursor=cursor, limit=limit, view=partial(_ledger_lines, session, vehicle))
+    return page_of(session, wanted, order, part, partial(_ledger_lines, session, vehicle))
 
 
 def _ledger_lines(session: Session, vehicle: VehicleRow, lines: Sequence[Row[Any]]) -> list[GivenGains]:

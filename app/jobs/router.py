@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Query
 from app.common.schemas import Page
 from app.common.states import JobState
 from app.jobs import service
-from app.web.dependencies import CurrentSettings, CursorText, Id, IdempotentPost, Limit, Reader, json_only
+from app.web.dependencies import CurrentSettings, Id, IdempotentPost, Limit, Reader, WantedPart, json_only
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json_only)])
 
@@ -15,13 +15,12 @@ router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json
 @router.get("")
 def list_jobs(
     session: Reader,
+    part: WantedPart,
     state: Annotated[list[JobState] | None, Query()] = None,
     campaign_id: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None,
-    limit: Limit = 50,
-    cursor: CursorText = None,
 ) -> Page[service.Job]:
     """Jobs, newest first."""
-    return service.list_jobs(session, states=state or [], campaign_id=campaign_id, limit=limit, cursor=cursor)
+    return service.list_jobs(session, part, states=state or [], campaign_id=campaign_id)
 
 
 @router.get("/{job_id}")

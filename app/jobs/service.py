@@ -21,7 +21,7 @@ from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.db.base import JsonObject, added, utc_now
 from app.db.models import JobRow
-from app.db.pages import Order, page_of
+from app.db.pages import Order, Part, page_of
 
 
 class Job(Schema):
@@ -174,18 +174,14 @@ def latest_ordered(session: Session, kind: str, name: str, states: Collection[Jo
     return session.scalar(_newest(kind).where(_is_order(name), JobRow.state.in_(states)))
 
 
-def list_jobs(
-    session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int, cursor: str | None
-) -> Page[Job]:
+def list_jobs(session: Session, part: Part, *, states: Collection[JobState], campaign_id: int | None) -> Page[Job]:
     """Page of jobs, newest first."""
     wanted = select(JobRow)
     if states:
         wanted = wanted.where(JobRow.state.in_(states))
     if campaign_id is not None:
         wanted = wanted.where(JobRow.campaign_id == campaign_id)
-    return page_of(
-        session, wanted, _NEWEST_FIRST, cursor=cursor, limit=limit, view=lambda rows: [job_view(row) for row in rows]
-    )
+    return page_of(session, wanted, _NEWEST_FIRST, part, lambda rows: [job_view(row) for row in rows])
 
 
 def get_job(session: Session, job_id: int) -> Job:

@@ -29,6 +29,7 @@ from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
 from app.db.base import utc_now
 from app.db.models import TrialPhotoRow
+from app.db.pages import Part
 from app.db.trajectories import damaged_trials
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
@@ -39,8 +40,7 @@ from app.vehicles.base import Identity
 from app.vehicles.flight_end import FlightEnd, cause_text
 from app.vehicles.registry import VEHICLE_KINDS
 
-_ALL: Final = 2**31
-"""More than any list has."""
+_ALL: Final = Part(limit=2**31)
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +278,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     """Collect all data of a campaign, as for one reader. Raises NotFoundError."""
     campaign = campaigns.get_campaign(session, campaign_id)
     statistics = campaign_statistics(session, campaign_id)
-    trials = trials_service.list_trials(session, campaign_id, limit=_ALL, cursor=None).items
+    trials = trials_service.list_trials(session, campaign_id, _ALL).items
     definition = campaign.definition
     experiment = EXPERIMENTS[definition.experiment].configured(definition.experiment_options)
     vehicle = fleet.get_vehicle(session, campaign.vehicle.id)
@@ -313,7 +313,7 @@ def _anomalies(
     yield from vehicle_anomalies(
         campaign,
         vehicle,
-        acts_view(session, vehicle.id, limit=_ALL, cursor=None).items,
-        ledger_view(session, vehicle.id, limit=_ALL, cursor=None).items,
+        acts_view(session, vehicle.id, _ALL).items,
+        ledger_view(session, vehicle.id, _ALL).items,
         trials,
     )

@@ -22,6 +22,7 @@ from starlette.datastructures import FormData, UploadFile
 from app.accounts.permissions import RequestContext
 from app.common.errors import InputError, MediaTypeError, Problem
 from app.common.settings import Settings
+from app.db.pages import Part
 from app.db.session import Database, carry_out_once
 from app.figures.theme import ThemeName
 from app.live.hub import Live as LiveLink
@@ -55,6 +56,13 @@ ControlToken = Annotated[
 
 
 # These are coroutines and so need no thread: an abort gets through while every thread waits for the database.
+
+
+async def _wanted_part(limit: Limit = 50, cursor: CursorText = None) -> Part:
+    return Part(limit, cursor)
+
+
+WantedPart = Annotated[Part, Depends(_wanted_part)]
 
 
 def of_app(name: str) -> Any:

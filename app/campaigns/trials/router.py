@@ -26,13 +26,12 @@ from app.web.dependencies import (
     PLANNED_RECORD_BODY,
     REQUEST_BODY,
     CurrentSettings,
-    CursorText,
     Id,
     IdempotentPost,
-    Limit,
     Reader,
     Record,
     RequestContextDep,
+    WantedPart,
     Writer,
     described,
     json_only,
@@ -50,9 +49,9 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 
 
 @router.get("/campaigns/{campaign_id}/trials")
-def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[Trial]:
+def list_trials(session: Reader, campaign_id: Id, part: WantedPart) -> Page[Trial]:
     """The trials of a campaign, in the order of their numbers."""
-    return service.list_trials(session, campaign_id, limit=limit, cursor=cursor)
+    return service.list_trials(session, campaign_id, part)
 
 
 @router.post("/campaigns/{campaign_id}/gate")

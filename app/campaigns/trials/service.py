@@ -33,7 +33,7 @@ from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.core.tuning.stop_rules import describe_budget
 from app.db.base import JsonObject, added
 from app.db.models import CampaignRow, ProposalRow, TrialRow
-from app.db.pages import Order, page_of
+from app.db.pages import Order, Part, page_of
 from app.db.trajectories import pack
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -127,12 +127,12 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
         )
 
 
-def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
+def list_trials(session: Session, campaign_id: int, part: Part) -> Page[Trial]:
     """List trials by number. Raises NotFoundError, or InputError for a cursor of another list."""
     campaign = campaigns.get_row(session, campaign_id)
-    wanted, view = repository.trials_wanted(campaign_id), partial(trial_views, session, campaign)
     by_number = Order("number", TrialRow.number.expression)
-    return page_of(session, wanted, by_number, cursor=cursor, limit=limit, view=view)
+    wanted = repository.trials_wanted(campaign_id)
+    return page_of(session, wanted, by_number, part, partial(trial_views, session, campaign))
 
 
 def get_trial(session: Session, trial_id: int) -> Trial:
