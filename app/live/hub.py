@@ -27,7 +27,6 @@ from app.live.messages import (
     Telemetry,
     VehicleLinkState,
     VehicleStatus,
-    encode,
     live_address,
 )
 
@@ -37,9 +36,6 @@ WAITING_CHANGES: Final = 2000
 """A stream that lags behind by more changes is ended; its client reconnects with the last id and misses none."""
 WAITING_TELEMETRY: Final = 100
 """A stream that lags behind by more live messages loses the oldest; more than 3 s of one flight and its vehicle."""
-
-WRITTEN: Final = 2 * WAITING_TELEMETRY
-"""Live messages whose JSON is cached: every stream sends the same, and encoding it for each would delay an abort."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +102,6 @@ class Hub:
         self._subscriptions: set[Subscription] = set()
         self._flights: dict[int, tuple[Telemetry, float]] = {}
         self._vehicles: dict[int, tuple[VehicleStatus, float]] = {}
-        self._written: dict[int, tuple[PublishedMessage, str]] = {}
         self._open = True
 
     @contextmanager
@@ -171,15 +166,6 @@ class Hub:
         before, _ = self._flights[message.trial_id]
         before.samples.extend(message.samples)
         return replace(message, samples=before.samples)
-
-    def text(self, item: PublishedMessage) -> str:
-        """JSON of a message, encoded once for all streams."""
-        known = self._written.get(id(item))
-        if known is None:  # the item is kept with its text, so that no other object can get its id
-            known = self._written[id(item)] = item, encode(item).decode().rstrip()
-            if len(self._written) > WRITTEN:
-                del self._written[next(iter(self._written))]
-        return known[1]
 
     def close(self) -> None:
         """End every stream, so that the server can stop at once."""

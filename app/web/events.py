@@ -14,7 +14,7 @@ from app.db.models import EventRow
 from app.db.outbox import holds_everything_after, latest_event_before, latest_event_id
 from app.db.session import Database
 from app.live.hub import LinkState, LiveItem, changes_after
-from app.live.messages import FlightPhase, Telemetry, VehicleStatus
+from app.live.messages import FlightPhase, Telemetry, VehicleStatus, encode
 from app.web.dependencies import CurrentDatabase, Live
 
 router = APIRouter(prefix="/api", tags=["events"])
@@ -51,14 +51,14 @@ async def events(
         if not known:
             yield ServerSentEvent(event="reset", id=str(sent), data={})
         for change in await asyncio.to_thread(list, changes_after(database, sent)):
-            yield _event(live, change)
+            yield _event(change)
             sent = change.id
         async for item in stream:
             if isinstance(item, EventRow):
                 if item.id <= sent:
                     continue
                 sent = item.id
-            yield _event(live, item)
+            yield _event(item)
 
 
 def _start(database: Database, last_event_id: str | None, since_s: float) -> tuple[int, bool]:
@@ -74,7 +74,7 @@ def _start(database: Database, last_event_id: str | None, since_s: float) -> tup
         return latest, False
 
 
-def _event(live: Live, item: EventRow | LiveItem) -> ServerSentEvent:
+def _event(item: EventRow | LiveItem) -> ServerSentEvent:
     match item:
         case EventRow():
             return ServerSentEvent(
@@ -85,4 +85,4 @@ def _event(live: Live, item: EventRow | LiveItem) -> ServerSentEvent:
         case LinkState():
             return ServerSentEvent(event="worker", data={"worker": item.worker})
         case Telemetry() | FlightPhase() | VehicleStatus():
-            return ServerSentEvent(event=item.type, raw_data=live.hub.text(item))
+            return ServerSentEvent(event=item.type, raw_data=encode(item).decode().rstrip())
