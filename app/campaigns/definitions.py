@@ -97,10 +97,10 @@ def check_campaign(
             hint="Remove the donor, or set start.kind to 'campaign'.",
         )
     definition = core_definition(asked)
-    problems = [
-        *_replaced(definition.experiment, continues),
-        *(Problem(f"definition.{each.field}", each.reason) for each in problems_of(definition, EXPERIMENTS)),
-    ]
+    problems = [Problem(f"definition.{each.field}", each.reason) for each in problems_of(definition, EXPERIMENTS)]
+    if (replaced := definition.experiment) in REPLACEMENTS and replaced != continues:
+        reason = f"{replaced!r} is no longer offered for new campaigns; use {REPLACEMENTS[replaced]!r} instead"
+        problems.insert(0, Problem("definition.experiment", reason))
     options: dict[str, OptionValue] = {}
     try:
         options |= check_options(vehicle.kind, vehicle.options, field="vehicle") if vehicle.id is None else {}
@@ -114,12 +114,6 @@ def check_campaign(
             hint="Correct the fields listed, then try again; nothing was changed.",
         )
     return definition, options
-
-
-def _replaced(experiment: str, continues: str) -> Iterator[Problem]:
-    if experiment in REPLACEMENTS and experiment != continues:
-        reason = f"{experiment!r} is no longer offered for new campaigns; use {REPLACEMENTS[experiment]!r} instead"
-        yield Problem("definition.experiment", reason)
 
 
 def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionValue]) -> Iterator[Problem]:
