@@ -10,15 +10,16 @@ from rich.markup import escape
 
 from app.cli.console import console, table, write_json
 from app.reproductions.controller import run_controller
-from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction
+from app.reproductions.registry import REPRODUCTIONS, Reproduction
 from app.reproductions.results import Result
 
 ALL: Final = "all"
 
 
 def reproduce(name: str, *, full: bool, trace: Path | None, json_out: Path | None) -> None:
-    """Run one reproduction, or all in their order, and print measured, published and their ratio. Raises InputError."""
-    chosen = tuple(REPRODUCTIONS.values()) if name == ALL else (get_reproduction(name),)
+    """Run one reproduction, or all in their order, and print measured, published and their ratio. Raises InputError
+    for a trace that cannot be read."""
+    chosen = tuple(REPRODUCTIONS.values()) if name == ALL else (REPRODUCTIONS[name],)
     documents = []
     for each in chosen:
         result = _run(each, full, trace if each.name == "controller" else None)

@@ -8,7 +8,6 @@ campaign, which exclude the paper's own (ki = 1356).
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -27,11 +26,11 @@ from app.reproductions.results import Row
 
 _TAKEOFF: Final = Takeoff()
 _RAW: Final = Definition(options={"scaled": False, "bias": "outside"}, stop=StopRule(kind="paper"))
-CAMPAIGNS: Final[Mapping[str, Definition]] = MappingProxyType({
+CAMPAIGNS: Final[Mapping[str, Definition]] = {
     "from the default gains": _RAW,
     "from the simplex's gains": replace(_RAW, start=Start(kind="simplex")),
     "from the default gains, diminishing step size": replace(_RAW, options=_RAW.options | {"step_size": "diminishing"}),
-})  # fmt: skip
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

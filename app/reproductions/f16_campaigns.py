@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import product
 from statistics import median
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -77,7 +76,7 @@ _ALL: Final = (
         log_noise=1.0,
     ),
 )
-METHODS: Final[Mapping[str, Method]] = MappingProxyType({method.name: method for method in _ALL})
+METHODS: Final[Mapping[str, Method]] = {method.name: method for method in _ALL}
 
 
 Errors = tuple[float, ...]

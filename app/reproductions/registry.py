@@ -6,10 +6,8 @@ The modules that run them are imported on use, so that listing them needs none.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from types import MappingProxyType
 from typing import Final
 
-from app.core.errors import InputError, Problem
 from app.processes import follow_parent, perform
 from app.reproductions.results import Progress, Result
 
@@ -101,18 +99,7 @@ _ALL: Final = (
     ),
 )
 
-REPRODUCTIONS: Final[Mapping[str, Reproduction]] = MappingProxyType({each.name: each for each in _ALL})
-
-
-def get_reproduction(name: str) -> Reproduction:
-    """The reproduction with this name. Raises InputError if there is none."""
-    if name not in REPRODUCTIONS:
-        raise InputError(
-            "Unknown reproduction.",
-            hint=f"Choose one of: {', '.join(REPRODUCTIONS)}.",
-            problems=(Problem("name", f"unknown name {name!r}"),),
-        )
-    return REPRODUCTIONS[name]
+REPRODUCTIONS: Final[Mapping[str, Reproduction]] = {each.name: each for each in _ALL}
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,5 +114,5 @@ def reproduce(pipe: Connection, name: str, full: bool) -> None:
     """Main function of a low-priority process: compute one reproduction, and send ProgressReports, then the outcome."""
     follow_parent(NICENESS)
     pipe.send(
-        perform(lambda: get_reproduction(name).run(lambda share, doing: pipe.send(ProgressReport(share, doing)), full))
+        perform(lambda: REPRODUCTIONS[name].run(lambda share, doing: pipe.send(ProgressReport(share, doing)), full))
     )

@@ -10,7 +10,6 @@ Table 2, so that its agreement with them is circular.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from app.autopilots.registry import get_experiment
@@ -46,7 +45,7 @@ def overruled_for(gains: Gains, vehicle: str) -> str:
     return require_flyable(judge_takeoff(gains), overrule=OVERRULE, is_real=get_kind(vehicle).is_real)
 
 
-VEHICLES: Final[Mapping[str, Mapping[str, OptionValue]]] = MappingProxyType({"jsbsim": {}, "twin": {"scatter": 0.0}})
+VEHICLES: Final[Mapping[str, Mapping[str, OptionValue]]] = {"jsbsim": {}, "twin": {"scatter": 0.0}}
 """Vehicles used by reproductions, with options for flights without noise."""
 
 FROM_DEFAULT: Final = 5
@@ -84,7 +83,7 @@ class Table:
         return {"default": runs_of(runs[:FROM_DEFAULT]), "simplex": runs_of(runs[FROM_DEFAULT:])}
 
 
-TABLES: Final[Mapping[str, Table]] = MappingProxyType({
+TABLES: Final[Mapping[str, Table]] = {
     "table1": Table("jsbsim", (
         PublishedFlight((283, 13, 82), 0.3775, 0.3267),
         PublishedFlight((285, 44, 82), 0.2006, 0.1873),
@@ -106,7 +105,7 @@ TABLES: Final[Mapping[str, Table]] = MappingProxyType({
         PublishedFlight((1599, 1366, 130), 0.1249, 0.1281),
         PublishedFlight((1612, 1361, 163), 0.1278, 0.1211),
     )),
-})  # fmt: skip
+}  # fmt: skip
 _SOURCES: Final = {
     "table1": "The paper does not publish the airframe of its simulation. Two errors are illegible in the text of its "
     "accepted manuscript: run 4 from the default gains appears as 0.1722 and 0.1755, run 2 from the simplex's, 0.0900. "

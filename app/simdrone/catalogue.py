@@ -3,7 +3,6 @@ kinds as the flights of a body."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final, Protocol
 
 import numpy as np
@@ -68,9 +67,10 @@ class Airframe:
     flight: Callable[[dict[str, float], int], Simulated]
 
 
-AIRFRAMES: Final[Mapping[str, Airframe]] = MappingProxyType(
-    {"jsbsim": Airframe(JSBSIM, JsbsimFlight), "twin": Airframe(TWIN, TwinFlight)}
-)
+AIRFRAMES: Final[Mapping[str, Airframe]] = {
+    "jsbsim": Airframe(JSBSIM, JsbsimFlight),
+    "twin": Airframe(TWIN, TwinFlight),
+}
 
 
 def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> Body:

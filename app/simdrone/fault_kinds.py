@@ -5,7 +5,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from types import MappingProxyType
 from typing import ClassVar, Final, Protocol
 
 from app.autopilots.dialects import FieldValue
@@ -277,37 +276,35 @@ class GroundDrift(ChangedMessages):
         return -speed_m_s
 
 
-FAULTS: Final[Mapping[str, Callable[[FaultTarget], Fault]]] = MappingProxyType(
-    {
-        "no-heartbeat": partial(MissingMessages, kinds=("HEARTBEAT",)),
-        "param-unconfirmed": partial(Switched, switch=_flag("autopilot", "ignores_parameters")),
-        "arm-refused": partial(Switched, switch=_flag("autopilot", "refuses_arming")),
-        "no-lift-off": partial(Switched, switch=_flag("body", "motors_dead")),
-        "link-lost": LinkLost,
-        "deaf": Deaf,
-        "ack-lost": partial(MissingMessages, kinds=("MISSION_ACK",)),
-        "silent-witness": partial(MissingMessages, kinds=("SCRIPT_CURRENT", "EXTENDED_SYS_STATE")),
-        "taken-over": partial(Switched, switch=_take_over),
-        "foreign-kill": partial(Switched, switch=lambda drone, on: drone.autopilot.kill() if on else None),
-        "flies-home": partial(Switched, switch=_fly_home),
-        "frozen-position": FrozenPosition,
-        "jumping-position": JumpingPosition,
-        "stuck-altitude": StuckAltitude,
-        "drifting-altitude": partial(DriftingAltitude, drift_m_s=0.5),
-        "creeping-altitude": partial(DriftingAltitude, drift_m_s=0.1),
-        "lean-oscillation": LeanOscillation,
-        "low-battery": LowBattery,
-        "reboot": partial(Switched, switch=lambda drone, on: drone.reboot() if on else None),
-        "duplicated-packets": DuplicatedPackets,
-        "reordered-packets": ReorderedPackets,
-        "wrong-system": WrongSystem,
-        "carried-away": partial(Switched, switch=_carry_away),
-        "mocap-lost": partial(Switched, switch=_flag("cameras", "blind")),
-        "mocap-frozen": partial(Switched, switch=_flag("cameras", "stuck")),
-        "mocap-drift": partial(Switched, switch=_flag("cameras", "drifts")),
-        "ground-drift": GroundDrift,
-    }
-)
+FAULTS: Final[Mapping[str, Callable[[FaultTarget], Fault]]] = {
+    "no-heartbeat": partial(MissingMessages, kinds=("HEARTBEAT",)),
+    "param-unconfirmed": partial(Switched, switch=_flag("autopilot", "ignores_parameters")),
+    "arm-refused": partial(Switched, switch=_flag("autopilot", "refuses_arming")),
+    "no-lift-off": partial(Switched, switch=_flag("body", "motors_dead")),
+    "link-lost": LinkLost,
+    "deaf": Deaf,
+    "ack-lost": partial(MissingMessages, kinds=("MISSION_ACK",)),
+    "silent-witness": partial(MissingMessages, kinds=("SCRIPT_CURRENT", "EXTENDED_SYS_STATE")),
+    "taken-over": partial(Switched, switch=_take_over),
+    "foreign-kill": partial(Switched, switch=lambda drone, on: drone.autopilot.kill() if on else None),
+    "flies-home": partial(Switched, switch=_fly_home),
+    "frozen-position": FrozenPosition,
+    "jumping-position": JumpingPosition,
+    "stuck-altitude": StuckAltitude,
+    "drifting-altitude": partial(DriftingAltitude, drift_m_s=0.5),
+    "creeping-altitude": partial(DriftingAltitude, drift_m_s=0.1),
+    "lean-oscillation": LeanOscillation,
+    "low-battery": LowBattery,
+    "reboot": partial(Switched, switch=lambda drone, on: drone.reboot() if on else None),
+    "duplicated-packets": DuplicatedPackets,
+    "reordered-packets": ReorderedPackets,
+    "wrong-system": WrongSystem,
+    "carried-away": partial(Switched, switch=_carry_away),
+    "mocap-lost": partial(Switched, switch=_flag("cameras", "blind")),
+    "mocap-frozen": partial(Switched, switch=_flag("cameras", "stuck")),
+    "mocap-drift": partial(Switched, switch=_flag("cameras", "drifts")),
+    "ground-drift": GroundDrift,
+}
 """What each does is in docs/sim-drone.md."""
 
 

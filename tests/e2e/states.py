@@ -36,7 +36,7 @@ from app.flights import flight_rows
 from app.flights import service as flights
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
-from app.reproductions.registry import get_reproduction
+from app.reproductions.registry import REPRODUCTIONS
 from app.vehicles.base import FlightOptions
 from app.vehicles.flight_end import StopRequest
 from app.vehicles.registry import open_vehicle, restore_safe_gains
@@ -181,7 +181,7 @@ class States:
 
     def reproduce(self, name: str) -> None:
         """A reproduction that was run."""
-        result = asdict(get_reproduction(name).run(lambda _share, _doing: None, False))
+        result = asdict(REPRODUCTIONS[name].run(lambda _share, _doing: None, False))
 
         def store(session: Session) -> None:
             reproductions.request_run(session, name, full=False)
