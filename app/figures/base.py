@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Literal
 
 from pydantic import with_config
 
@@ -15,9 +15,6 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 
 Cell = str | int | float | None
 Trace = dict[str, object]
-
-CHECKED_ITEMS: Final = 20
-"""Items validated per list of a trace: lists are as long as there are flights or samples, with items of one kind."""
 
 logger = logging.getLogger(__name__)
 
@@ -86,14 +83,8 @@ class Figure(ABC):
     def ready(self, traces: Sequence[Trace], *, summary: str, table: Table, **layout: object) -> Card:
         """The card of a figure that could be drawn, with its part of the layout. The browser keeps what a person chose
         in the figure of the same name (`uirevision`).
-
-        Plotly validates every property, and the first items of long lists. Raises ValueError for a property that does
-        not exist.
         """
-        import plotly.graph_objects as go
-
         whole = self.palette.layout(**{"uirevision": self.name, **layout})
-        go.Figure(data=[_shortened(trace) for trace in traces], layout=whole)
         return Card(
             name=self.name,
             title=self.title,
@@ -179,10 +170,3 @@ def table_of_curves(
 def literal(text: str) -> str:
     """Escape user text for a trace's name or hover text, so that Plotly finds neither markup nor templates in it."""
     return html.escape(text, quote=False).replace("%{", "%&#123;")
-
-
-def _shortened(value: object) -> object:
-    """The same properties with lists cut to their first items: Plotly's validation of long lists is slow."""
-    if isinstance(value, Mapping):
-        return {name: _shortened(each) for name, each in value.items()}
-    return value[:CHECKED_ITEMS] if isinstance(value, list) else value

@@ -12,7 +12,6 @@ from contextlib import suppress
 from functools import partial
 from typing import Final
 
-import plotly  # noqa: F401, TID253
 import scipy  # noqa: F401, TID253
 import structlog
 import uvicorn
@@ -28,9 +27,9 @@ from app.web.addresses import addresses_elsewhere, qr_text, unlock_link, web_add
 
 TICKS_A_SECOND: Final = 10
 WITHOUT_DESCRIPTORS_S: Final = 0.05
-NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
-"""What charts and statistics need. Their packages are loaded above, before threads do: Python 3.11 fails to import a
-module of a package of which another thread is just ending the import (KeyError)."""
+NUMERICS: Final = ("scipy.integrate", "scipy.special", "numba")
+"""What statistics need. Their package is loaded above, before threads do: Python 3.11 fails to import a module of a
+package of which another thread is just ending the import (KeyError)."""
 NUMERICS_AFTER_S: Final = 5.0
 """How long after it is ready the server imports them, if no request has done so by then."""
 
@@ -146,7 +145,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
 
 
 def _load_numerics() -> None:
-    """Import the numerics, so that the first page with charts does not wait for them."""
+    """Import the numerics, so that the first page with statistics does not wait for them."""
     for module in NUMERICS:
         importlib.import_module(module)
 
