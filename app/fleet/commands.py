@@ -20,7 +20,7 @@ from app.accounts.permissions import Permission, RequestContext
 from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
-from app.db.base import JsonObject, added, utc_now
+from app.db.base import JsonObject, utc_now
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.fleet import repository
@@ -115,17 +115,8 @@ def _requested(
 
 
 def _add(session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: str = "") -> VehicleActRow:
-    return added(
-        session,
-        VehicleActRow(
-            vehicle_id=row.id,
-            kind=kind,
-            state=ActState.REQUESTED,
-            by=by,
-            reason=reason,
-            asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
-        ),
-    )
+    asked = dict(row.safe_gains) if kind in GIVES_GAINS else None
+    return record_act(session, row, kind, by=by, reason=reason, asked=asked, state=ActState.REQUESTED)
 
 
 def claim_act(session: Session, worker: str) -> ActTask | None:

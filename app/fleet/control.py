@@ -142,22 +142,23 @@ def record_act(
     reason: str,
     asked: dict[str, float] | None = None,
     result: JsonObject | None = None,
+    state: ActState = ActState.DONE,
 ) -> VehicleActRow:
-    """Record an act that is complete at once because it needs no answer from the vehicle, or has that of its
-    flight."""
+    """Record an act, by default one that is complete at once because it needs no answer from the vehicle, or has that
+    of its flight."""
     now = utc_now()
     return added(
         session,
         VehicleActRow(
             vehicle_id=row.id,
             kind=kind,
-            state=ActState.DONE,
+            state=state,
             by=by,
             reason=reason,
             asked=asked,
             result=result,
             requested_at=now,
-            finished_at=now,
+            finished_at=now if state == ActState.DONE else None,
         ),
     )
 
