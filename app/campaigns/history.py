@@ -36,7 +36,7 @@ from app.core.experiments.base import ModelledExperiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
 from app.db import trajectories
-from app.db.base import JsonObject, OptionsJson, utc_now
+from app.db.base import JsonObject, OptionsJson, existing, utc_now
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.vehicles.flight_end import FlightEnd, not_begun
 
@@ -174,9 +174,7 @@ def flight_under_way(session: Session, campaign_id: int | None = None) -> Flight
 
 def trial_row(session: Session, trial_id: int) -> TrialRow:
     """Raises NotFoundError."""
-    if (row := session.get(TrialRow, trial_id)) is None:
-        raise NotFoundError("trial", trial_id)
-    return row
+    return existing(session, TrialRow, trial_id, "trial")
 
 
 def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:

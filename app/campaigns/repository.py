@@ -7,9 +7,8 @@ from sqlalchemy import ColumnElement, Select, String, delete, func, or_, select,
 from sqlalchemy.orm import Session, defer, joinedload
 
 from app.campaigns.schemas import Sort
-from app.common.errors import NotFoundError
 from app.common.states import CampaignState, TrialState
-from app.db.base import OptionsJson
+from app.db.base import OptionsJson, existing
 from app.db.models import (
     CampaignRow,
     FlightRow,
@@ -127,9 +126,7 @@ ORDERS: Final[Mapping[Sort, Order]] = {
 
 def get_campaign(session: Session, campaign_id: int) -> CampaignRow:
     """The campaign with that id. Raises NotFoundError."""
-    if (row := session.get(CampaignRow, campaign_id)) is None:
-        raise NotFoundError("campaign", campaign_id)
-    return row
+    return existing(session, CampaignRow, campaign_id, "campaign")
 
 
 def ids_of_name(session: Session, name: str) -> list[int]:

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, Enum, MetaData, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
+from app.common.errors import NotFoundError
 from app.vehicles.flight_end import FlightEnd
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
@@ -116,6 +117,13 @@ class Reported(Numbered):
 
 
 R = TypeVar("R", bound=Base)
+
+
+def existing(session: Session, kind: type[R], identity: int, what: str) -> R:
+    """The row with that id. Raises NotFoundError, which says `what` there is none of."""
+    if (row := session.get(kind, identity)) is None:
+        raise NotFoundError(what, identity)
+    return row
 
 
 def added(session: Session, row: R) -> R:

@@ -7,7 +7,6 @@ from typing import Any, Final, TypeVar
 from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, union_all
 from sqlalchemy.orm import Bundle, Session
 
-from app.common.errors import NotFoundError
 from app.common.states import (
     ACTIVE_ACT_STATES,
     ACTIVE_FLIGHT_STATES,
@@ -16,6 +15,7 @@ from app.common.states import (
     ActState,
     VehicleState,
 )
+from app.db.base import existing
 from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleActRow, VehicleRow
 from app.db.pages import Order
 
@@ -26,9 +26,7 @@ T = TypeVar("T", FlightRow, VehicleActRow)
 
 def get_one(session: Session, vehicle_id: int) -> VehicleRow:
     """The vehicle with that id. Raises NotFoundError."""
-    if (row := session.get(VehicleRow, vehicle_id)) is None:
-        raise NotFoundError("vehicle", vehicle_id)
-    return row
+    return existing(session, VehicleRow, vehicle_id, "vehicle")
 
 
 def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
@@ -56,9 +54,7 @@ def flight_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
 
 def get_act(session: Session, act_id: int) -> VehicleActRow:
     """The act with that id. Raises NotFoundError."""
-    if (row := session.get(VehicleActRow, act_id)) is None:
-        raise NotFoundError("act", act_id)
-    return row
+    return existing(session, VehicleActRow, act_id, "act")
 
 
 def act_under_way(session: Session, vehicle_id: int) -> VehicleActRow | None:

@@ -15,11 +15,11 @@ from sqlalchemy import ColumnElement, Select, select, update
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
-from app.common.errors import GainlineError, NotFoundError
+from app.common.errors import GainlineError
 from app.common.logging import LogLine, lines_of_job
 from app.common.schemas import Page, Schema, Trouble
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
-from app.db.base import JsonObject, added, utc_now
+from app.db.base import JsonObject, added, existing, utc_now
 from app.db.models import JobRow
 from app.db.pages import Order, Part, page_of
 
@@ -239,9 +239,7 @@ def _remaining_s(row: JobRow) -> float | None:
 
 def _one(session: Session, job_id: int) -> JobRow:
     """The job with that id. Raises NotFoundError."""
-    if (row := session.get(JobRow, job_id)) is None:
-        raise NotFoundError("job", job_id)
-    return row
+    return existing(session, JobRow, job_id, "job")
 
 
 def _held_by(session: Session, job_id: int, worker: str) -> JobRow | None:
