@@ -13,7 +13,6 @@ from app.campaigns import history, repository
 from app.campaigns.definitions import experiment_of_campaign, flown_evidence
 from app.campaigns.proposals import is_stale
 from app.common.states import FLOWN_TRIAL_STATES, TrialState
-from app.core.definition import Interval
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
@@ -146,7 +145,7 @@ def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
         outcome="not yet reviewed" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
         error=row.error,
         predicted_error=error,
-        interval=_range(interval),
+        interval=interval,
         glitches=_glitches(row),
     )
 
@@ -167,10 +166,6 @@ def _noise(now: Evidence[Experiment]) -> Noise | None:
         around_best=Range(best.mean - half, best.mean + half),
         best_numbers=best.numbers,
     )
-
-
-def _range(interval: Interval | None) -> Range | None:
-    return None if interval is None else Range(interval.lower, interval.upper)
 
 
 def _glitches(row: TrialRow) -> tuple[Range, ...]:
@@ -238,7 +233,7 @@ def _predicted_flight(
         curve=curve,
         predicted_error=error,
         band=None if error is None else band,
-        interval=_range(interval),
+        interval=interval,
     )
 
 

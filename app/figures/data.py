@@ -11,6 +11,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.definition import Interval
 from app.core.policy import Gain, Gains
 from app.core.records.trajectory import Samples, select_bends, select_samples
 
@@ -73,7 +74,7 @@ class AnyFlight:
     gains: Gains
     curve: Curve = NO_CURVE
     predicted_error: float | None = None
-    interval: Range | None = None
+    interval: Interval | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,9 +6,10 @@ from itertools import accumulate
 from typing import Any, Final
 
 from app.core import formatting
+from app.core.definition import Interval
 from app.figures import theme
 from app.figures.base import CampaignFigure, Card, Cell, Column, Table, Trace, scatter
-from app.figures.data import AnyFlight, Range, robust_top
+from app.figures.data import AnyFlight, robust_top
 from app.figures.overlays import MANY, off_scale_traces
 
 FEW: Final = 8
@@ -108,7 +109,7 @@ class ErrorsFigure(CampaignFigure):
         """Range up to the first flight's error, every other one that is no outlier, and what was or is predicted; and
         the indices of the outliers."""
         errors = [flight.error for flight in self.history.flights if flight.error is not None]
-        expected = [interval.high for _, interval in self._expected()]
+        expected = [interval.upper for _, interval in self._expected()]
         expected += [value for _, value in self._predictions()]
         high = max(self.history.valid_errors[:1], default=min(errors))
         return robust_top(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
@@ -191,8 +192,8 @@ class ErrorsFigure(CampaignFigure):
         x, y, text = [], [], []
         for number, interval in known:
             x += [number, number, None]
-            y += [round(max(0.0, interval.low), 6), round(min(1.08 * top, interval.high), 6), None]
-            text += 3 * [f"{interval.low:.4f} … {interval.high:.4f}"]
+            y += [round(max(0.0, interval.lower), 6), round(min(1.08 * top, interval.upper), 6), None]
+            text += 3 * [f"{interval.lower:.4f} … {interval.upper:.4f}"]
         yield scatter(
             "90 % interval",
             (x, y),
@@ -213,7 +214,7 @@ class ErrorsFigure(CampaignFigure):
         """The flights whose predictions are drawn."""
         return [*(() if self._is_crowded else self.history.flights), *self.history.next_flights]
 
-    def _expected(self) -> list[tuple[int, Range]]:
+    def _expected(self) -> list[tuple[int, Interval]]:
         return [(each.number, each.interval) for each in self._predicted_flights() if each.interval is not None]
 
     def _labels(self, top: float) -> list[dict[str, object]]:
@@ -360,5 +361,5 @@ class ErrorsFigure(CampaignFigure):
         )
 
 
-def _ends(interval: Range | None) -> tuple[float | None, float | None]:
-    return (None, None) if interval is None else (interval.low, interval.high)
+def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
+    return (None, None) if interval is None else (interval.lower, interval.upper)

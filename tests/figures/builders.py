@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from app.core.definition import Interval
 from app.core.policy import Gain
 from app.figures.base import Card
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range
@@ -31,7 +32,7 @@ def flight(
     outcome: Outcome = "valid",
     overshoot_m: float = 0.3,
     predicted_error: float | None = None,
-    interval: Range | None = None,
+    interval: Interval | None = None,
     glitches: tuple[Range, ...] = (),
 ) -> FlightData:
     return FlightData(
@@ -66,7 +67,7 @@ def history(
     )
 
 
-def proposal(number: int, *, interval: Range | None = None, band_m: float | None = None) -> NextFlight:
+def proposal(number: int, *, interval: Interval | None = None, band_m: float | None = None) -> NextFlight:
     """Expected to overshoot by 0.1 m, within ± `band_m` all along."""
     curve = climb(0.1)
     band = (

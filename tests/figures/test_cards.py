@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from app.core.definition import Interval
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, Figure, card_of
 from app.figures.data import Noise, Range, Repeats
@@ -78,12 +79,12 @@ def test_every_colour_that_a_figure_draws_with_can_be_seen_and_every_text_read(
     noise = Noise(0.01, (Repeats((1, 2), 0.3, 0.01),), Range(0.2, 0.3))
     past = history(
         *(
-            flight(number, 0.3 - 0.001 * number, predicted_error=0.2, interval=Range(0.1, 0.3))
+            flight(number, 0.3 - 0.001 * number, predicted_error=0.2, interval=Interval(lower=0.1, upper=0.3))
             for number in range(1, flights)
         ),
         flight(flights, 9.0, overshoot_m=9.0),
         flight(flights + 1, None, outcome="aborted", glitches=(Range(2.0, 3.0),)),
-        proposal=proposal(flights + 2, interval=Range(0.1, 0.2), band_m=0.1),
+        proposal=proposal(flights + 2, interval=Interval(lower=0.1, upper=0.2), band_m=0.1),
         noise=noise,
     )
     card = card_of(CAMPAIGN_FIGURES[name](past, theme_name=theme))

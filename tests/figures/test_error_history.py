@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import pytest
 
+from app.core.definition import Interval
 from app.figures.data import Noise, Range, Repeats
 from app.figures.error_history import ErrorsFigure
 from tests.figures.builders import flight, history, layout, proposal, trace, traces
@@ -114,16 +115,16 @@ def test_of_huge_errors_side_by_side_only_those_with_room_for_their_value_have_i
 
 
 def test_each_flight_stands_over_the_interval_it_was_expected_in() -> None:
-    flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Range(0.18, 0.22)))
-    card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Range(-0.01, 0.15)))).compute()
+    flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Interval(lower=0.18, upper=0.22)))
+    card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Interval(lower=-0.01, upper=0.15)))).compute()
     drawn = trace(card, "interval")
     assert drawn["x"] == [2, 2, None, 3, 3, None]
     assert drawn["y"] == [0.18, 0.22, None, 0.0, 0.15, None]
 
 
 def test_the_next_flight_is_the_last_of_the_predictions_and_named_for_the_page_that_moves_it() -> None:
-    flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Range(0.18, 0.22)))
-    card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Range(0.1, 0.15)))).compute()
+    flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Interval(lower=0.18, upper=0.22)))
+    card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Interval(lower=0.1, upper=0.15)))).compute()
     for role in ("predicted", "interval"):
         drawn = trace(card, role)
         assert (drawn["meta"]["next"], drawn["visible"]) == (3, True)
@@ -137,7 +138,9 @@ def test_the_next_flight_is_the_last_of_the_predictions_and_named_for_the_page_t
 
 
 def test_an_interval_far_above_all_errors_is_cut_at_the_edge_and_does_not_stretch_the_axis() -> None:
-    card = ErrorsFigure(history(flight(1, 0.3), proposal=proposal(2, interval=Range(0.1, 7.0)))).compute()
+    card = ErrorsFigure(
+        history(flight(1, 0.3), proposal=proposal(2, interval=Interval(lower=0.1, upper=7.0)))
+    ).compute()
     top = layout(card)["yaxis"]["range"][1]
     assert top < 0.4
     assert trace(card, "interval")["y"] == [0.1, pytest.approx(top), None]
@@ -160,8 +163,8 @@ def test_the_table_lists_every_flight_with_its_running_best_and_the_next_one_las
         history(
             flight(1, 0.3),
             flight(2, None, outcome="invalid"),
-            flight(3, 0.2, predicted_error=0.21, interval=Range(0.19, 0.23)),
-            proposal=proposal(4, interval=Range(0.1, 0.14)),
+            flight(3, 0.2, predicted_error=0.21, interval=Interval(lower=0.19, upper=0.23)),
+            proposal=proposal(4, interval=Interval(lower=0.1, upper=0.14)),
             noise=Noise(0.01),
         )
     ).compute()
