@@ -115,10 +115,6 @@ class Connections:
         if connection.phase != phase:
             connection.phase, connection.since_s = phase, self.clock.now_s()
 
-    def hear(self, connection: Connection) -> None:
-        """Note that the client has sent data."""
-        connection.heard_s = self.clock.now_s()
-
     def drop_overdue(self) -> None:
         """Close connections that take longer than permitted."""
         now_s = self.clock.now_s()
@@ -204,7 +200,7 @@ class LimitedProtocol(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         if self._refused:
             return
-        self._all.hear(self._own)
+        self._own.heard_s = self._all.clock.now_s()
         self._got_on = False
         super().data_received(data)
         self._bare_bytes = 0 if self._got_on else self._bare_bytes + len(data)

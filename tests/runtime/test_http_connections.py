@@ -131,7 +131,7 @@ def drip(table: Table, connection: Connection, until: Callable[[], bool]) -> flo
     begun_s = table.clock.now_s()
     while not until():
         table.pass_s(1.0)
-        table.all.hear(connection)
+        connection.heard_s = table.all.clock.now_s()
         table.all.enter(connection, connection.phase)
         table.all.drop_overdue()
     return table.clock.now_s() - begun_s
