@@ -236,7 +236,8 @@ class LiveClient:
         if self._writer is None:
             raise _link_down("no worker is running")
         answered: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
-        number, by_s = next(self._numbers), time.monotonic() + ORDER_TIMEOUT_S
+        number = next(self._numbers)
+        by_s = time.monotonic() + ORDER_TIMEOUT_S
         self._waiting[number] = answered
         self._writer.write(encode(Request(request=number, kind=kind, of=of, reason=reason, by_s=by_s)))
         try:
