@@ -12,8 +12,8 @@ import queue
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -157,12 +157,25 @@ class Worker:
             landscape_pool = stack.enter_context(ComputePool(LANDSCAPES_AT_ONCE, prepare=warm_up, niceness=5))
             job_runners = self._build_job_runners(database, pool, landscape_pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
+
+            def claim() -> None:
+                trial_ids = self.abort_registry.trial_ids
+                while len(trial_ids()) < FLIGHTS_AT_ONCE and (task := flight_runner.claim()) is not None:
+                    flying.submit(flight_runner.carry_out, task)
+                while (act := sessions.claim()) is not None:
+                    acting.submit(sessions.carry_out, act)
+                sessions.maintain()
+                for runner in job_runners:
+                    while (job := runner.claim()) is not None:
+                        computing.submit(runner.carry_out, job)
+                    runner.heartbeat()
+
             stack.callback(self.end, "the worker failed; see its log")
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid).add_done_callback(_say_it_computes)
             _log.info("worker ready", worker=self.name)
             say("The worker is ready to fly.")
-            self._loop(database, lambda: self._claim(flight_runner, flying, sessions, acting, job_runners, computing))
+            self._loop(database, claim)
             _log.info("worker ends", why=self.end_reason, flying=self.abort_registry.trial_ids())
 
     def _build_runners(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
@@ -213,25 +226,6 @@ class Worker:
                     _log.error("work cannot be claimed", why=str(error))
                     self.closing.wait(RETRY_S)
                 watch.wait(self.closing, LOOK_ANYWAY_S)
-
-    def _claim(
-        self,
-        flight_runner: FlightRunner,
-        flying: Executor,
-        sessions: VehicleConnectionManager,
-        acting: Executor,
-        job_runners: Sequence[JobRunner],
-        computing: Executor,
-    ) -> None:
-        while len(self.abort_registry.trial_ids()) < FLIGHTS_AT_ONCE and (task := flight_runner.claim()) is not None:
-            flying.submit(flight_runner.carry_out, task)
-        while (act := sessions.claim()) is not None:
-            acting.submit(sessions.carry_out, act)
-        sessions.maintain()
-        for runner in job_runners:
-            while (job := runner.claim()) is not None:
-                computing.submit(runner.carry_out, job)
-            runner.heartbeat()
 
     def _until_stored(self, work: Callable[[], None]) -> None:
         if not self.closing.is_set():
