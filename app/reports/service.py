@@ -34,7 +34,7 @@ from app.db.trajectories import damaged_trials
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.fleet import service as fleet
-from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
+from app.fleet.schemas import Vehicle
 from app.fleet.views import acts_view, ledger_view
 from app.vehicles.base import Identity
 from app.vehicles.flight_end import FlightEnd, cause_text
@@ -229,22 +229,18 @@ def _end_beside(state: str, end: FlightEnd | None) -> str:
 
 
 def vehicle_anomalies(
-    campaign: Campaign,
-    vehicle: Vehicle,
-    acts: Iterable[VehicleAct],
-    ledger: Iterable[GivenGains],
-    trials: Iterable[Trial],
+    session: Session, campaign: Campaign, vehicle: Vehicle, trials: Iterable[Trial]
 ) -> Iterator[Anomaly]:
     """Safe gains that could not be verified after a flight, quarantine, and releases from it during the campaign."""
     numbers = {trial.id: trial.number for trial in trials}
-    for line in ledger:
+    for line in ledger_view(session, vehicle.id, _ALL).items:
         if line.purpose == "restore after flight" and line.campaign_id == campaign.id and line.outcome == "failed":
             sentence = f"Safe gains {format_gains(line.asked)} were not read back after the flight."
             flight = None if line.trial_id is None else numbers.get(line.trial_id)
             yield Anomaly(flight, "Safe gains not verified", sentence)
     if vehicle.state == "quarantined":
         yield Anomaly(None, "Quarantine", f"{vehicle.name} is quarantined: {vehicle.concern}")
-    for act in acts:
+    for act in acts_view(session, vehicle.id, _ALL).items:
         if act.kind == "release" and campaign.created_at <= act.requested_at <= campaign.updated_at:
             by = f" by {act.by}" if act.by else ""
             yield Anomaly(None, "Quarantine", f"Released{by} during the campaign: {act.reason}")
@@ -308,12 +304,5 @@ def _anomalies(
 ) -> Iterator[Anomaly]:
     yield from flight_anomalies(trials, unit)
     yield from (Anomaly(row.number, "Damaged record", _DAMAGED_RECORD) for row in damaged_trials(session, campaign.id))
-    if not vehicle.registered:
-        return
-    yield from vehicle_anomalies(
-        campaign,
-        vehicle,
-        acts_view(session, vehicle.id, _ALL).items,
-        ledger_view(session, vehicle.id, _ALL).items,
-        trials,
-    )
+    if vehicle.registered:
+        yield from vehicle_anomalies(session, campaign, vehicle, trials)
