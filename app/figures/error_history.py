@@ -9,14 +9,16 @@ from app.core import formatting
 from app.core.definition import Interval
 from app.figures import theme
 from app.figures.base import CampaignFigure, Card, Cell, Column, Table, Trace, scatter
-from app.figures.data import AnyFlight, robust_top
-from app.figures.overlays import MANY, off_scale_traces
+from app.figures.data import AnyFlight, FlightData, robust_top
+from app.figures.overlays import MANY, triangle
 
 FEW: Final = 8
 """Up to this number of flights, every error is labelled."""
 STRIP: Final = 0.1
 """Height of the strip below the axis of errors, for flights without one, as a share of the figure."""
 _STRIP_GAP: Final = 0.07
+PRINT: Final = 0.18
+"""Width of a printed error on a phone, as a share of the axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +58,7 @@ class ErrorsFigure(CampaignFigure):
             *self._repeats(),
             *self._measured(),
             *self._not_valid(),
-            *off_scale_traces(
-                self.palette,
-                [scored[index] for index in outside],
-                top,
-                history.error_unit,
-                last=history.last_number,
-                crowded=self._is_crowded,
-            ),
+            *self._off_scale([scored[index] for index in outside], top),
         ]
         return self.ready(
             traces,
@@ -264,6 +259,34 @@ class ErrorsFigure(CampaignFigure):
                         showlegend=placed is scored or not scored,
                         hovertemplate=f"<b>Flight %{{x}}, %{{text}}</b><br>{note}<extra></extra>",
                     )
+
+    def _off_scale(self, flights: list[FlightData], top: float) -> Iterator[Trace]:
+        """Marks at the edge `top` for errors above it: of many flights in one trace, of few one each, and with the
+        errors that have room."""
+        if flights and self._is_crowded:
+            yield scatter(
+                "Off scale",
+                ([flight.number for flight in flights], [top] * len(flights)),
+                role="off scale",
+                mode="markers",
+                text=[f"{flight.error:.2f} {self.history.error_unit}" for flight in flights],
+                marker={"symbol": "triangle-up", "size": 8, "color": self.palette.bad},
+                cliponaxis=False,
+                hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+            )
+            return
+        free = 0.0
+        for flight in flights:
+            has_room = flight.number >= free
+            yield triangle(
+                f"Flight {flight.number}: {flight.error:.2f} {self.history.error_unit}",
+                (flight.number, top),
+                self.palette.bad,
+                trial=flight.number,
+                label=f"↑ {flight.error:.2f}" if has_room else "",
+            )
+            if has_room:
+                free = flight.number + PRINT * self.history.last_number
 
     def _best_so_far(self) -> Trace:
         numbers = [flight.number for flight in self.history.valid]

@@ -63,51 +63,7 @@ def glitch_traces(
     )
 
 
-PRINT: Final = 0.18
-"""Width of a printed error on a phone, as a share of the axis."""
-
-
-def off_scale_traces(
-    palette: theme.Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
-) -> list[Trace]:
-    """Marks at height `top` of an axis that ends with flight `last`: of many flights in one trace, of few one each, and
-    with the errors that have room.
-    """
-    if crowded:
-        together = scatter(
-            "Off scale",
-            ([flight.number for flight in flights], [top] * len(flights)),
-            role="off scale",
-            mode="markers",
-            text=[f"{flight.error:.2f} {unit}" for flight in flights],
-            marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
-            cliponaxis=False,
-            hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
-        )
-        return [together] if flights else []
-    printed = set(_with_room([flight.number for flight in flights], PRINT * last))
-    return [
-        _triangle(
-            f"Flight {flight.number}: {flight.error:.2f} {unit}",
-            (flight.number, top),
-            palette.bad,
-            trial=flight.number,
-            label=f"↑ {flight.error:.2f}" if flight.number in printed else "",
-        )
-        for flight in flights
-    ]
-
-
-def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
-    """Of ascending numbers, those at least `room` away from the last one selected."""
-    free = 0.0
-    for number in numbers:
-        if number >= free:
-            free = number + room
-            yield number
-
-
-def _triangle(
+def triangle(
     name: str,
     at: tuple[float, float],
     colour: str,
@@ -172,7 +128,7 @@ def off_scale(
     up = leaves_upward(values, low, high)
     peak = int(values.argmax() if up else values.argmin())
     name = f"{text} reaches {signed(values[peak], 2)} {unit} at {curve.time_s[peak]:.1f} s"
-    return _triangle(
+    return triangle(
         name,
         (round(float(curve.time_s[peak]), 3), high if up else low),
         colour,
