@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
-from typing import Final, Literal, cast
+from typing import Final, cast
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -20,7 +20,7 @@ from app.core.tuning.evidence import Evidence
 from app.core.tuning.strategy import band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, ProposalRow, TrialRow
-from app.figures import CAMPAIGN_FIGURES
+from app.figures import CAMPAIGN_FIGURES, FigureName
 from app.figures.base import Card, card_of
 from app.figures.data import (
     NO_CURVE,
@@ -80,13 +80,7 @@ class FigureView:
     predicted: int | None = None
 
 
-def campaign_figure(
-    session: Session,
-    campaign_id: int,
-    name: Literal["takeoffs", "errors", "gains"],
-    theme: ThemeName,
-    view: FigureView,
-) -> Card:
+def campaign_figure(session: Session, campaign_id: int, name: FigureName, theme: ThemeName, view: FigureView) -> Card:
     """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
     past = history_of(session, campaign_id, view if name == "takeoffs" else None)
     return card_of(CAMPAIGN_FIGURES[name](past, theme_name=theme))

@@ -24,6 +24,7 @@ from app.campaigns.vehicle_history import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import Page
 from app.common.states import CampaignState
+from app.figures import FigureName
 from app.figures.base import Card
 from app.figures.data import Range
 from app.fleet import registration
@@ -177,7 +178,7 @@ def get_landscape(
 def get_campaign_figure(
     session: Reader,
     campaign_id: Id,
-    name: Literal["takeoffs", "errors", "gains"],
+    name: FigureName,
     theme: Theme = "light",
     from_s: Annotated[float | None, Query(description="start of the displayed time range in seconds")] = None,
     to_s: Annotated[float | None, Query(description="end of the displayed time range in seconds")] = None,
