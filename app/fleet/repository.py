@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any, Final, TypeVar
 
-from sqlalchemy import ColumnElement, Select, String, and_, delete, func, literal, null, or_, select, union_all
+from sqlalchemy import Select, String, and_, delete, func, literal, null, or_, select, union_all
 from sqlalchemy.orm import Bundle, Session
 
 from app.common.states import (
@@ -83,6 +83,12 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
     without that although its gains were on the vehicle. A connection that wrote nothing is a line if it read gains.
     """
     flight = FlightRow.vehicle_id == vehicle_id
+    is_left_with_its_gains = and_(
+        FlightRow.finished_at.is_not(null()),
+        FlightRow.read_back.is_not(null()),
+        FlightRow.safe_gains.is_not(null()),
+        FlightRow.vehicle.has(VehicleRow.registered),
+    )
     lines = union_all(
         select(
             FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("id"), literal("flight", String).label("why")
@@ -91,7 +97,7 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
             func.coalesce(FlightRow.restored_at, FlightRow.finished_at),
             2 * FlightRow.id + 1,
             literal(RESTORE_AFTER_FLIGHT, String),
-        ).where(flight, or_(FlightRow.restored_at.is_not(null()), _is_left_with_its_gains())),
+        ).where(flight, or_(FlightRow.restored_at.is_not(null()), is_left_with_its_gains)),
         select(VehicleActRow.requested_at, 2 * VehicleActRow.id, VehicleActRow.kind.cast(String)).where(
             VehicleActRow.vehicle_id == vehicle_id,
             VehicleActRow.kind.in_(GIVES_GAINS),
@@ -100,16 +106,6 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
         ),
     ).subquery()
     return select(Bundle("line", lines.c.id, lines.c.why)), Order("-at", lines.c.at, descending=True)
-
-
-def _is_left_with_its_gains() -> ColumnElement[bool]:
-    """Whether a flight of a registered vehicle ended with its gains written and no safe gains read back since."""
-    return and_(
-        FlightRow.finished_at.is_not(null()),
-        FlightRow.read_back.is_not(null()),
-        FlightRow.safe_gains.is_not(null()),
-        FlightRow.vehicle.has(VehicleRow.registered),
-    )
 
 
 def rows_by_id(session: Session, kind: type[T], ids: Iterable[int]) -> dict[int, T]:

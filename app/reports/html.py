@@ -147,7 +147,6 @@ def _environment() -> "Environment":
         "interval": _interval,
         "gain": formatting.gain,
         "gains": formatting.format_gains,
-        "signed_gain": _signed_gain,
         "relative_to": formatting.relative_to,
         "count": formatting.count,
         "flights": formatting.named_flights,
@@ -180,10 +179,6 @@ def _instant(at: datetime | None) -> str:
         return f"{local} UTC"
     utc = f"{there:%H:%M}" if there.date() == here.date() else f"{there.day} {there:%b, %H:%M}"
     return f"{local} {here.tzname()} ({utc} UTC)"
-
-
-def _signed_gain(change: float) -> str:
-    return f"+{formatting.gain(change)}" if change > 0 else formatting.gain(change)
 
 
 def _data_uri(photo: TrialPhotoRow) -> Markup:
