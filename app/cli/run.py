@@ -28,7 +28,6 @@ from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
 from app.common.states import HISTORY_TRIAL_STATES, CampaignState, TrialState, VehicleState
 from app.core.definition import Definition, Interval
-from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
@@ -56,24 +55,21 @@ def run_campaign(file: CampaignFile, *, json_out: Path | None, data_dir: Path, o
     """
     definition, options = check_campaign(file.definition, file.vehicle)
     _require_flyable(file.vehicle, options)
-    experiment = experiment_of(definition)
     given = gains_by_hand(file, definition, within_bounds=not overrule)
     folder: Path | None = None
     if get_kind(file.vehicle.kind).connect is not None:
         prepare_data_dir(data_dir)
         folder = trial_parameters_folder(data_dir)
     out = console(json_out)
-    display = _Display(definition, experiment)
+    display = _Display(definition)
 
     def report(stopped_because: str) -> None:
-        _print(out, file, experiment, display, stopped_because)
-        write_json(json_out, _document(file, definition, options, display, stopped_because))
+        _print(out, file, display, stopped_because)
+        write_json(json_out, _document(file, options, display, stopped_because))
 
     try:
         with display.progress, _logs_to_stderr(), _temporary_database() as database:
-            stopped_because = _Campaign(database, file, experiment, display, folder).fly(
-                given, overrule, max_flights=definition.stop.max_flights
-            )
+            stopped_because = _Campaign(database, file, display, folder).fly(given, overrule)
     except BaseException as error:
         if display.trials or display.touched:
             report(f"an error occurred: {str(error) or type(error).__name__}")
@@ -128,12 +124,7 @@ class _Campaign:
     """
 
     def __init__(
-        self,
-        database: Database,
-        file: CampaignFile,
-        experiment: Experiment,
-        display: "_Display",
-        trial_parameters: Path | None,
+        self, database: Database, file: CampaignFile, display: "_Display", trial_parameters: Path | None
     ) -> None:
         self._database = database
         self._display = display
@@ -155,14 +146,15 @@ class _Campaign:
             if kind.connect is None:
                 self._id = campaigns.create_campaign(session, file).id
                 return
-            safe_gains = experiment.space.mapping(experiment.space.default)
+            space = display.experiment.space
+            safe_gains = space.mapping(space.default)
             new = NewVehicle(name=kind.name, kind=kind.name, options=file.vehicle.options, safe_gains=safe_gains)
             choice = VehicleChoice(kind=kind.name, id=register_vehicle(session, new, LOCAL_CLI).id)
             self._id = campaigns.create_campaign(session, file.model_copy(update={"vehicle": choice})).id
             # Ready without a connection: the link is opened for each flight.
             fleet.set_vehicle_state(campaigns.get_row(session, self._id).vehicle, VehicleState.READY)
 
-    def fly(self, given: Sequence[Gains], overrule: str, *, max_flights: int) -> str:
+    def fly(self, given: Sequence[Gains], overrule: str) -> str:
         """Fly proposals until the campaign is finished, or the given gain sets until all are flown; return why it ends.
 
         Raises GainsError when the gate refuses the gains, unless `overrule` is a reason, and VehicleError when the
@@ -173,7 +165,7 @@ class _Campaign:
             trials = self._display.trials
             if finished is not None:
                 return finished
-            if len(trials) >= max_flights:
+            if len(trials) >= self._display.definition.stop.max_flights:
                 unscored = sum(trial.state not in HISTORY_TRIAL_STATES for trial in trials)
                 return f"All {len(trials)} flights have been flown; {unscored} of them could not be scored."
             if given and len(trials) == len(given):
@@ -227,7 +219,9 @@ class _Display:
     `touched`: whether any gains were written to the vehicle. `held`: the gains last read back, None while unknown.
     """
 
-    def __init__(self, definition: Definition, experiment: Experiment) -> None:
+    def __init__(self, definition: Definition) -> None:
+        self.definition = definition
+        self.experiment = experiment_of(definition)
         self.progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
@@ -236,10 +230,8 @@ class _Display:
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self.progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
-        self._limit = definition.stop.max_flights
-        self._unit = experiment.error_unit
-        self._output_unit = CHANNEL_UNITS[experiment.output]
+        lasts_s = float(self.experiment.grid_s[-1])
+        self._task = self.progress.add_task("computing the first gains", total=lasts_s, note="")
         self.trials: list[TrialRow] = []
         self.kinds: list[str] = []
         self.touched = False
@@ -253,20 +245,21 @@ class _Display:
             self._task,
             completed=0.0,
             note="",
-            description=f"flight {number} of at most {self._limit}, {format_gains(gains)}",
+            description=f"flight {number} of at most {self.definition.stop.max_flights}, {format_gains(gains)}",
         )
 
     def hear(self, message: PublishedMessage) -> None:
         match message:
             case Telemetry(samples=[*_, [time_s, output, *_]]):
-                self.progress.update(self._task, completed=time_s, note=f"{output:.2f} {self._output_unit}")
+                unit = CHANNEL_UNITS[self.experiment.output]
+                self.progress.update(self._task, completed=time_s, note=f"{output:.2f} {unit}")
             case FlightPhase(note=note) if note:
                 self.progress.update(self._task, note=note)
 
     def landed(self, trial: TrialRow, kind: str) -> None:
         self.trials.append(trial)
         self.kinds.append(kind)
-        error = "no error" if trial.error is None else f"{trial.error:.4f} {self._unit}"
+        error = "no error" if trial.error is None else f"{trial.error:.4f} {self.experiment.error_unit}"
         self.progress.console.print(
             f"flight {trial.number}: {format_gains(trial.gains)} → {error} "
             f"({trial.state}{f': {reason}' if (reason := reason_of(trial)) else ''})",
@@ -275,9 +268,9 @@ class _Display:
         self.progress.update(self._task, description="computing the next gains", completed=0.0, note="")
 
 
-def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _Display, stopped_because: str) -> None:
-    names = experiment.space.names
-    unit = experiment.error_unit
+def _print(out: Console, file: CampaignFile, display: _Display, stopped_because: str) -> None:
+    names = display.experiment.space.names
+    unit = display.experiment.error_unit
     best = history.best_of(display.trials)
     rows = [
         (
@@ -309,19 +302,15 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
 
 
 def _document(
-    file: CampaignFile,
-    definition: Definition,
-    options: Mapping[str, OptionValue],
-    display: _Display,
-    stopped_because: str,
+    file: CampaignFile, options: Mapping[str, OptionValue], display: _Display, stopped_because: str
 ) -> dict[str, object]:
     best = history.best_of(display.trials)
     predictions = [_prediction(trial, display.trials) for trial in display.trials]
     return {
         "name": file.name,
         "vehicle": {"kind": file.vehicle.kind, "options": dict(options)},
-        "definition": stored(definition),
-        "definition_digest": definition.digest(),
+        "definition": stored(display.definition),
+        "definition_digest": display.definition.digest(),
         "trials": [
             {
                 "number": trial.number,
