@@ -204,8 +204,8 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
     experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
     problems = [
         Problem(f"trial.{index}", reason)
-        for index, trial_id in enumerate(trial_ids)
-        if (reason := _refusal(trial_ids, index, found.get(trial_id), found, experiments)) is not None
+        for index in range(len(trial_ids))
+        if (reason := _refusal(trial_ids, index, found, experiments)) is not None
     ]
     if problems:
         raise InputError(
@@ -256,15 +256,11 @@ def population_of(campaign: CampaignRow, experiment: Experiment) -> Population:
 
 
 def _refusal(
-    trial_ids: Sequence[int],
-    index: int,
-    row: TrialRow | None,
-    found: Mapping[int, TrialRow],
-    experiments: Mapping[int, Experiment],
+    trial_ids: Sequence[int], index: int, found: Mapping[int, TrialRow], experiments: Mapping[int, Experiment]
 ) -> str | None:
     """Why the flight at this index cannot be compared, or None if it can."""
     trial_id = trial_ids[index]
-    if row is None:
+    if (row := found.get(trial_id)) is None:
         return f"there is no trial {trial_id}; its campaign may have been deleted"
     if trial_id in trial_ids[:index]:
         return f"flight {row.number} of campaign {row.campaign_id} is listed twice"
