@@ -76,7 +76,7 @@ def acts_of(vehicle_id: int) -> Select[VehicleActRow]:
 
 
 def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
-    """The lines of the ledger, each with its purpose `why` and an `id`, half of which is that of its flight or act; and
+    """The lines of the ledger, each with its `kind` and an `id`, half of which is that of its flight or act; and
     their order, newest first.
 
     A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
@@ -91,7 +91,7 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
     )
     lines = union_all(
         select(
-            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("id"), literal("flight", String).label("why")
+            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("id"), literal("flight", String).label("kind")
         ).where(flight),
         select(
             func.coalesce(FlightRow.restored_at, FlightRow.finished_at),
@@ -105,7 +105,7 @@ def ledger(vehicle_id: int) -> tuple[Select[Any], Order]:
             or_(VehicleActRow.asked.is_not(null()), VehicleActRow.read_back.is_not(null())),
         ),
     ).subquery()
-    return select(Bundle("line", lines.c.id, lines.c.why)), Order("-at", lines.c.at, descending=True)
+    return select(Bundle("line", lines.c.id, lines.c.kind)), Order("-at", lines.c.at, descending=True)
 
 
 def rows_by_id(session: Session, kind: type[T], ids: Iterable[int]) -> dict[int, T]:

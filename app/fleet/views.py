@@ -71,13 +71,15 @@ def ledger_view(session: Session, vehicle_id: int, part: Part) -> Page[GivenGain
 
 def _ledger_lines(session: Session, vehicle: VehicleRow, lines: Sequence[Row[Any]]) -> list[GivenGains]:
     of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
-    flights = repository.rows_by_id(session, FlightRow, [line.id // 2 for line in lines if line.why in of_flights])
-    acts = repository.rows_by_id(session, VehicleActRow, [line.id // 2 for line in lines if line.why not in of_flights])
+    flights = repository.rows_by_id(session, FlightRow, [line.id // 2 for line in lines if line.kind in of_flights])
+    acts = repository.rows_by_id(
+        session, VehicleActRow, [line.id // 2 for line in lines if line.kind not in of_flights]
+    )
     items = []
     for line in lines:
-        if line.why == "flight":
+        if line.kind == "flight":
             items.append(_of_flight(flights[line.id // 2]))
-        elif line.why == repository.RESTORE_AFTER_FLIGHT:
+        elif line.kind == repository.RESTORE_AFTER_FLIGHT:
             items.append(_of_restoring(vehicle, flights[line.id // 2]))
         else:
             items.append(_of_act(acts[line.id // 2]))
