@@ -8,7 +8,7 @@ and thrusts are positive up.
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from itertools import groupby
 from operator import itemgetter
@@ -224,6 +224,15 @@ class Recording:
     def history(self, names: Collection[str]) -> ParameterHistory:
         """Of these parameters."""
         return ParameterHistory.of((each.time_s, each.name, each.value) for each in self.settings if each.name in names)
+
+
+def date_of(utc_s: float) -> datetime | None:
+    """The date, UTC, of a time since 1970; None if no clock was set, or it is ahead."""
+    is_set = _CLOCKS_SET.timestamp() <= utc_s <= (datetime.now(UTC) + timedelta(days=1)).timestamp()
+    return datetime.fromtimestamp(utc_s, UTC) if is_set else None
+
+
+_CLOCKS_SET: Final = datetime(2001, 1, 1, tzinfo=UTC)
 
 
 def release_of(packed: int) -> str:

@@ -11,7 +11,7 @@ from array import array
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
@@ -27,6 +27,7 @@ from app.autopilots.recording import (
     Source,
     Span,
     columns_of,
+    date_of,
     release_of,
     restarts,
     spans_of,
@@ -115,7 +116,7 @@ class _Clock:
     first_heard_s: float = np.inf
     last_heard_s: float = 0.0
     _ahead_s: float = 0.0
-    _zero_s: float = np.inf
+    zero_s: float = np.inf
     """The ground's time at 0 s, once its clock is set."""
 
     def at(self, boot_ms: float, stamp_s: float) -> float:
@@ -127,15 +128,9 @@ class _Clock:
             self.restarts.append(Event(EventKind.BOOT, time_s, "the vehicle restarting"))
         self.now_s, self.last_heard_s = max(self.now_s, time_s), stamp_s
         self.first_heard_s = min(self.first_heard_s, stamp_s)
-        if stamp_s >= _SET_S and self._zero_s > stamp_s:
-            self._zero_s = stamp_s - time_s
+        if stamp_s >= _SET_S and self.zero_s > stamp_s:
+            self.zero_s = stamp_s - time_s
         return time_s
-
-    @property
-    def started_at(self) -> datetime | None:
-        """The date of 0 s; None if the ground station's clock was not set, or is ahead."""
-        is_past = self._zero_s <= (datetime.now(UTC) + timedelta(days=1)).timestamp()
-        return datetime.fromtimestamp(self._zero_s, UTC) if is_past else None
 
 
 @dataclass(slots=True)
@@ -183,7 +178,7 @@ class _Decoder:
             system=self.vehicle.system,
             release=self._release,
             frame=self.vehicle.frame,
-            started_at=self._clock.started_at,
+            started_at=date_of(self._clock.zero_s),
             heard_s=self._clock.first_heard_s,
             columns=columns_of(tables, sources, clock=_TIME, ticks_per_s=1.0),
             sources=list(tables),

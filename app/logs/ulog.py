@@ -26,8 +26,8 @@ _LARGEST_ARRAY: Final = 64
 _MAX_FIELDS: Final = 300
 _FIELD: Final = re.compile(r"(u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,3})\])? (\w+)")
 _APPENDED: Final = 0x01
-_VALUES: Final[Mapping[str, Collection[str]]] = {"P": ("float", "int32_t"), "I": ("uint32_t",)}
-"""Types of parameters, and of the numbers about the log."""
+_VALUES: Final[Mapping[str, Mapping[str, int]]] = {"P": {"float": 4, "int32_t": 4}, "I": {"uint32_t": 4, "uint64_t": 8}}
+"""Types of parameters, and of the numbers about the log, with their bytes."""
 
 HINT: Final = "Use PX4's .ulg log of the flight, with vehicle_local_position in it."
 
@@ -183,7 +183,7 @@ class _LogFilter:
         offsets = [int.from_bytes(body[at : at + 8], "little") for at in (16, 24, 32)]
         self._appended = sorted(offset for offset in offsets if offset)
 
-    def _is_value(self, body: bytes, kinds: Collection[str]) -> bool:
+    def _is_value(self, body: bytes, kinds: Mapping[str, int]) -> bool:
         """Whether this is a wanted name in PX4's form, "float NAME" of one of these kinds, and its value."""
         kind, _, name = body[1 : 1 + body[0]].decode("ascii", "replace").partition(" ")
-        return kind in kinds and name in self.values and len(body) == 1 + body[0] + 4
+        return name in self.values and len(body) - 1 - body[0] == kinds.get(kind)

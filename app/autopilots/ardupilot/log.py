@@ -3,6 +3,7 @@
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from itertools import pairwise
 from types import MappingProxyType
 from typing import BinaryIO, Final
@@ -21,6 +22,7 @@ from app.autopilots.recording import (
     Setting,
     Source,
     columns_of,
+    date_of,
     left_out,
     restarts,
 )
@@ -82,7 +84,7 @@ _ROWS: Final[Mapping[str, tuple[Collection[str], int]]] = {"BAT": (("Inst", "Ins
 """The first battery, and the failsafe for vibration, which replaces the loop."""
 _UNTIL_3_3: Final[Mapping[str, Source]] = {"thrust": Source("CTUN", "ThrOut", 0.001)}
 _WANTED: Final = frozenset(
-    {"PARM", "MAVC", "EV", "MSG", *(each.message for part in (*LOOPS, BESIDE) for each in part.values())}
+    {"PARM", "MAVC", "EV", "MSG", "GPS", *(each.message for part in (*LOOPS, BESIDE) for each in part.values())}
 )
 
 _ACCEPTED: Final = (0, 5)
@@ -108,6 +110,9 @@ _BANNER: Final = re.compile(
     rb"(APM:Copter|ArduCopter|ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V(\d[\w.-]*)"
 )
 _FRAME: Final = re.compile(rb"Frame: ([\w/-]+)")
+_WEEK_S: Final = 604_800.0
+_GPS_BEGAN_S: Final = datetime(1980, 1, 6, tzinfo=UTC).timestamp() - 18.0
+"""Less the leap seconds since then."""
 _COPTERS: Final = ("APM:Copter", "ArduCopter")
 
 
@@ -136,7 +141,14 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
         events=sorted(_events(tables, log.boots_s), key=lambda event: event.time_s),
         notes=[*restarts(len(log.boots_s)), *left_out(log.skipped_bytes, log.odd_rows)],
+        started_at=None if log.boots_s else date_of(_booted_s(tables)),
     )
+
+
+def _booted_s(tables: Mapping[str, Table]) -> float:
+    """Time since 1970 at 0 s, by the GPS, whose time is ahead of UTC by leap seconds; 0 if it had none."""
+    fixes = rows_of(tables.get("GPS", {}), CLOCK, "GWk", "GMS")
+    return next((_GPS_BEGAN_S + week * _WEEK_S + ms / 1e3 - at_s for at_s, week, ms in fixes if week > 0.0), 0.0)
 
 
 def history(recording: Recording, names: frozenset[str]) -> ParameterHistory:

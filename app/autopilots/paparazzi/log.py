@@ -18,7 +18,7 @@ import numpy as np
 
 from app.autopilots.paparazzi.profile import PAPARAZZI
 from app.autopilots.paparazzi.replica.loop_log import FIELDS, GAINS, Counts, FlownGains, LoopLog, flown_gains
-from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, increasing
+from app.autopilots.recording import Column, Event, EventKind, Recording, Setting, date_of, increasing
 from app.core.control.vertical_guidance import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples
@@ -72,6 +72,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
         events=[] if loop is None else list(_events(loop)),
         notes=list(configuration.notes(flown)),
         remarks=[f"other aircraft in the log left out: {others}"] if others else [],
+        started_at=date_of(configuration.began_s),
         loop=loop,
         flown=flown,
         are_logged=configuration.contains(flown),
@@ -177,6 +178,8 @@ class _Configuration:
     """
 
     aircraft: str
+    began_s: float = 0.0
+    """The ground station's time since 1970 at the beginning of the log."""
     known: dict[str, list[tuple[float, float]]] = field(default_factory=lambda: {gain: [] for gain in GAINS})
     is_certain: bool = True
     is_described: bool = True
@@ -251,7 +254,9 @@ class _Configuration:
 
     def _element(self, tag: str, attributes: dict[str, str]) -> None:
         given, kind = {name.lower(): value for name, value in attributes.items()}, tag.lower()
-        if kind == "aircraft":
+        if kind == "configuration":
+            self.began_s = _number_in(given.get("time_of_day", "").encode())
+        elif kind == "aircraft":
             self._is_mine = given.get("ac_id") == self.aircraft
             self.is_described |= self._is_mine
         elif not self._is_mine:

@@ -19,12 +19,13 @@ from app.autopilots.recording import (
     Source,
     Span,
     columns_of,
+    date_of,
     release_of,
     spans_of,
 )
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, rows_of
-from app.logs.ulog import read_ulog_tables
+from app.logs.ulog import ULogTables, read_ulog_tables
 
 POSITION, TARGET, SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
 TAKEOFF, STATUS, _ATTITUDE = "takeoff_status", "vehicle_status", "vehicle_attitude_setpoint"
@@ -88,7 +89,7 @@ AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
 }  # fmt: skip
 """Kinds of vehicles that are no copter with several rotors, by the values of parameters."""
 
-_RELEASE: Final = "ver_sw_release"
+_RELEASE, _BOOT_DATE, _GPS = "ver_sw_release", "boot_time_utc_us", "vehicle_gps_position"
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
@@ -101,8 +102,8 @@ _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position",
 
 def read_px4(stream: BinaryIO) -> Recording:
     """Decode a whole log. Raises TrajectoryError if it is not a readable ULog."""
-    wanted = {_COMMAND, _ANSWER, *(source.message for source in (*SOURCES.values(), *_OLDER_SOURCES.values()))}
-    values = {*LOOP_NAMES, *THRUST_GAINS.values(), VEHICLE, *AIRFRAMES, _RELEASE}
+    wanted = {_COMMAND, _ANSWER, _GPS, *(source.message for source in (*SOURCES.values(), *_OLDER_SOURCES.values()))}
+    values = {*LOOP_NAMES, *THRUST_GAINS.values(), VEHICLE, *AIRFRAMES, _RELEASE, _BOOT_DATE}
     tables = read_ulog_tables(stream, topics=wanted, values=values)
     columns = columns_of(tables.topics, _OLDER_SOURCES, clock="timestamp")
     columns |= columns_of(tables.topics, SOURCES, clock="timestamp")
@@ -115,6 +116,7 @@ def read_px4(stream: BinaryIO) -> Recording:
         sources=[topic for topic, table in tables.topics.items() if len(table.get("timestamp", ()))],
         settings=[Setting(*each) for each in tables.settings],
         notes=tables.notes,
+        started_at=date_of(_booted_s(tables)),
     )
     return replace(
         recording,
@@ -123,6 +125,12 @@ def read_px4(stream: BinaryIO) -> Recording:
         armed=None if arming is None else _spans(arming.time_s, arming.values == ARMED),
         remarks=list(_remarks(columns)),
     )
+
+
+def _booted_s(tables: ULogTables) -> float:
+    """Time since 1970 at 0 s, by the vehicle's own clock or by its GPS; 0 if neither was set."""
+    fixes = rows_of(tables.topics.get(_GPS, {}), "timestamp", "time_utc_usec")
+    return tables.information.get(_BOOT_DATE, 0) / 1e6 or next((us / 1e6 - at_s for at_s, us in fixes if us), 0.0)
 
 
 def _spans(time_s: Samples, holds: Rows) -> list[Span]:
