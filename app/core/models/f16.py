@@ -80,7 +80,8 @@ def rollout(
         elevator = min(max(elevator, LOWEST_ELEVATOR_DEG), HIGHEST_ELEVATOR_DEG)
         errors[i] = error
         if len(detail) > 0:
-            detail[i, :STATES] = memory[:STATES]
+            for j in range(STATES):
+                detail[i, j] = memory[j]
             detail[i, REFERENCE], detail[i, THRUST], detail[i, ELEVATOR] = reference, thrust, elevator
         if abs(error) >= LARGEST_ERROR_RAD:
             memory[DIVERGED] = 1.0
@@ -92,7 +93,8 @@ def rollout(
                 total += transition[j, k] * memory[k]
             moved[j] = total + bias[i, j] if len(bias) > 0 else total
         memory[DISTANCE] += STEP_S * (AIRSPEED_FT_S + 0.5 * (memory[SPEED] + moved[SPEED]))
-        memory[:STATES] = moved
+        for j in range(STATES):
+            memory[j] = moved[j]
 
 
 def track(gains: Samples, transition: Samples, samples: int) -> tuple[Samples, Samples]:
