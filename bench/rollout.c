@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdint.h>
+#include <stdlib.h>
 
 enum { ZETA_OMEGA = 1519, OMEGA_2 = 389, SPEED_MAX = 393216, ACCELERATION_MIN = -5022, ACCELERATION_MAX = 2009,
        WEIGHT = 2571632, INVERSE_MASS = 408, R33 = 16384, R33_MIN = 8578 };
@@ -10,11 +11,18 @@ enum { ZETA_OMEGA = 1519, OMEGA_2 = 389, SPEED_MAX = 393216, ACCELERATION_MIN = 
 typedef struct {
     int64_t p;
     int32_t v, a, sum, z_ref, zd_ref, zdd_ref, ff_cmd, fb_cmd;
+    int64_t largest_product;
     int32_t check_phase, checks_passed;
 } Loop;
 
 static int32_t limit(int32_t value, int32_t low, int32_t high) {
     return value < low ? low : value > high ? high : value;
+}
+
+static void remember(Loop *loop, int64_t product) {
+    int64_t size = llabs(product);
+    if (size > loop->largest_product)
+        loop->largest_product = size;
 }
 
 static int detect_flight(Loop *loop, int32_t thrust) {
@@ -52,12 +60,15 @@ static int32_t step(Loop *loop, int32_t target, int32_t kp, int32_t ki, int32_t 
     loop->sum = in_flight ? limit(loop->sum + ez, -2000000, 2000000) : 0;
     int32_t force = (WEIGHT - (loop->zdd_ref << 8)) / INVERSE_MASS;
     loop->ff_cmd = limit((force << 14) / (r33 > R33_MIN ? r33 : R33_MIN), 0, 8640);
+    remember(loop, (int64_t)-kp * ez);
+    remember(loop, (int64_t)-kd * ev);
+    remember(loop, (int64_t)-ki * loop->sum);
     loop->fb_cmd = ((-kp * ez) >> 7) + ((-kd * ev) >> 16) + ((-ki * loop->sum) >> 16);
     return limit(loop->ff_cmd + loop->fb_cmd, 0, 9600);
 }
 
-void rollout(int32_t kp, int32_t ki, int32_t kd, double hover, double lag, double drag, int32_t target, int64_t n,
-             double *altitude) {
+int64_t rollout(int32_t kp, int32_t ki, int32_t kd, double hover, double lag, double drag, int32_t target, int64_t n,
+                double *altitude) {
     Loop loop = {0};
     double height = 0.0, climb = 0.0, thrust = 0.0, response = lag > 1.0 / 512 ? 1.0 / 512 / lag : 1.0;
     int32_t command = 0;
@@ -75,4 +86,5 @@ void rollout(int32_t kp, int32_t ki, int32_t kd, double hover, double lag, doubl
             climb = climb > 0.0 ? climb : 0.0;
         }
     }
+    return loop.largest_product;
 }

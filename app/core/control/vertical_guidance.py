@@ -88,8 +88,8 @@ SPEED_ERROR_MAX: Final = fix(10.0, SPEED_BITS)
 ERROR_SUM_MAX: Final = 2_000_000
 
 (
-    P, V, A, Z_SUM_ERR, Z_REF, ZD_REF, ZDD_REF, FF_CMD, FB_CMD, CHECK_PHASE, CHECKS_PASSED, STATE_SIZE,
-) = range(12)  # fmt: skip
+    P, V, A, Z_SUM_ERR, Z_REF, ZD_REF, ZDD_REF, FF_CMD, FB_CMD, LARGEST_PRODUCT, CHECK_PHASE, CHECKS_PASSED, STATE_SIZE,
+) = range(13)  # fmt: skip
 """Indices in the state array."""
 
 State = NDArray[np.int64]
@@ -158,11 +158,12 @@ def feed_forward(zdd_ref: int, r33: int) -> int:
 
 @kernel
 def _feedback(state: State, kp: int, ki: int, kd: int, ez: int, ev: int) -> int:
-    """PID on limited errors; each product wraps at 32 bits."""
-    proportional = wrap32(-kp * ez) >> 7
-    damping = wrap32(-kd * ev) >> 16
-    integral = wrap32(-ki * state[Z_SUM_ERR]) >> 16
-    return wrap32(proportional + damping + integral)
+    """PID on limited errors; each product wraps at 32 bits, and the largest one before wrapping is stored."""
+    proportional = -kp * ez
+    damping = -kd * ev
+    integral = -ki * state[Z_SUM_ERR]
+    state[LARGEST_PRODUCT] = max(state[LARGEST_PRODUCT], abs(proportional), abs(damping), abs(integral))
+    return wrap32((wrap32(proportional) >> 7) + (wrap32(damping) >> 16) + (wrap32(integral) >> 16))
 
 
 @kernel

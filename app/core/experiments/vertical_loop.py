@@ -80,7 +80,7 @@ class VerticalLoop(ModelledExperiment):
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
-        channels = fly(counts(gains), self._models(model, 1)[0], self.set_points, self._samples)
+        channels, _ = fly(counts(gains), self._models(model, 1)[0], self.set_points, self._samples)
         time_s = self.grid_s
         named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
         return Trajectory(time_s, named, "model", "simulation")

@@ -27,6 +27,7 @@ from app.core.control.vertical_guidance import (
     FB_CMD,
     FF_CMD,
     FULL_THRUST,
+    LARGEST_PRODUCT,
     LEVEL,
     NOMINAL_HOVER_THROTTLE,
     POSITION_BITS,
@@ -253,8 +254,24 @@ def fly_steps(
 
 
 @kernel
-def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Samples | None, channels: Samples) -> None:
-    """Fly one flight to its `targets` (8 fractional bits, see `SetPoints`).
+def steps_of_climb(targets: Counts) -> int:
+    """Steps until the first change of the targets, shape (t,); t if there is none."""
+    for i in range(len(targets)):
+        if targets[i] != targets[0]:
+            return i
+    return len(targets)
+
+
+@kernel
+def delay_start(signal: Samples, targets: Counts, latency_s: float) -> None:
+    """Delay the part of a signal before the first change of the targets, all of it if there is none, in place."""
+    climb = steps_of_climb(targets)
+    delay_by(signal[:climb] if climb < len(targets) else signal, latency_s * RATE_HZ)
+
+
+@kernel
+def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Samples | None, channels: Samples) -> int:
+    """Fly one flight to its `targets` (8 fractional bits, see `SetPoints`); return the largest |product| in the loop.
 
     `gains` holds kp, ki, kd; `model` the eight parameters; `disturbances` have shape (n, 3). Writes `channels` every
     1/512 s from the command on, in the order of `CHANNELS`: shape (6, n), or (1, n) for the altitude alone.
@@ -263,19 +280,15 @@ def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Sample
     start(state, 0, 0)
     fly_steps(state, vehicle, new_past(model), model, ALT, targets, gains, disturbances, True, np.inf, False, channels)
     if model[START_LATENCY_S] > 0.0:
-        changed = np.flatnonzero(targets != targets[0])
-        first_change = changed[0] if len(changed) > 0 else channels.shape[1]
         for channel in range(channels.shape[0]):
-            delay_by(channels[channel, :first_change], model[START_LATENCY_S] * RATE_HZ)
+            delay_start(channels[channel], targets, model[START_LATENCY_S])
+    return int(state[LARGEST_PRODUCT])
 
 
-def fly(
-    gains: Counts, model: Samples, set_points: SetPoints, samples: int, disturbances: Samples | None = None
-) -> Samples:
-    """One flight with every channel: shape (6, samples) in the order of `CHANNELS`."""
+def fly(gains: Counts, model: Samples, set_points: SetPoints, samples: int) -> tuple[Samples, int]:
+    """One flight with every channel: shape (6, samples) in the order of `CHANNELS`, and the largest |product|."""
     channels = np.empty((len(CHANNELS), samples))
-    rollout(gains, model, set_points.targets, disturbances, channels)
-    return channels
+    return channels, rollout(gains, model, set_points.targets, None, channels)
 
 
 def reference_altitude(set_points: SetPoints, samples: int) -> Samples:
@@ -283,8 +296,8 @@ def reference_altitude(set_points: SetPoints, samples: int) -> Samples:
     vehicle with any gains."""
     model = np.zeros(BATTERY_SAG + 1)
     model[HOVER_THROTTLE] = NOMINAL_HOVER_THROTTLE
-    reference_m: Samples = fly(np.zeros(3, dtype=np.int64), model, set_points, samples)[CHANNELS.index("reference_m")]
-    return reference_m
+    channels, _ = fly(np.zeros(3, dtype=np.int64), model, set_points, samples)
+    return np.asarray(channels[CHANNELS.index("reference_m")])
 
 
 def fly_each(
@@ -311,7 +324,9 @@ def fly_recorded(gains: Counts, model: Samples, set_points: SetPoints, disturban
     """The same for one flight with every channel, shape (6, n): gains (3,), model (8,)."""
     prompt = model.copy()
     prompt[[START_LATENCY_S, MEASUREMENT_DELAY_S]] = 0.0
-    return fly(gains, prompt, set_points, len(disturbances), disturbances)
+    channels = np.empty((len(CHANNELS), len(disturbances)))
+    rollout(gains, prompt, set_points.targets, disturbances, channels)
+    return channels
 
 
 @kernel

@@ -11,6 +11,8 @@ from app.core.control.vertical_guidance import (
     FF_CMD,
     FULL_THRUST,
     INPUTS,
+    INT32_MAX,
+    LARGEST_PRODUCT,
     OUTPUTS,
     Z_REF,
     Z_SUM_ERR,
@@ -58,13 +60,16 @@ def test_in_flight_is_detected_when_the_recorded_autopilot_detected_it(path: Pat
     assert all(detected[detected.index(True) :])
 
 
-def test_gains_that_wrap_the_integrator_turn_full_up_into_full_down() -> None:
+def test_gains_that_wrap_the_integrator_turn_full_up_into_full_down_and_are_reported() -> None:
     """ki·sum wraps once ki > 2³¹ / 2 000 000 ≈ 1073."""
-    thrusts = []
+    thrusts, products = [], []
     for ki in (1073, 1074):
         state = new_state(0, 0)
         thrusts.append([step(state, 1, 3 << 8, 0, ki, 0, 0, 0, 16384, True) for _ in range(4000)][-1])
+        products.append(int(state[LARGEST_PRODUCT]))
     assert thrusts == [FULL_THRUST, 0]
+    assert products == [1073 * 2_000_000, 1074 * 2_000_000]
+    assert products[0] <= INT32_MAX < products[1]
 
 
 def test_throttle_mode_passes_the_thrust_through_and_keeps_the_last_commands() -> None:
