@@ -29,7 +29,7 @@ from app.core.control.vertical_guidance import (
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.kernels import kernel
 from app.core.models.set_points import SetPoints
-from app.core.models.vertical import reference_altitude
+from app.core.models.vertical_batch import reference_altitude
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
 from app.vehicles.simulated import gusts, streams

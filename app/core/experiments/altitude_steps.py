@@ -30,8 +30,8 @@ from app.core.models.vertical import (
     fly_recorded,
     force_at_hover,
     observe,
-    reference_altitude,
 )
+from app.core.models.vertical_batch import reference_altitude
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples, Trajectory
 

@@ -12,7 +12,7 @@ from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment, Matrix, Scatter
 from app.core.experiments.vertical_loop import VerticalLoop, counts
 from app.core.models.set_points import SetPoints
-from app.core.models.vertical import fly_each
+from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.metrics import mean_absolute_error, mean_absolute_errors, require_scorable
 from app.core.records.trajectory import Trajectory
@@ -104,7 +104,7 @@ class Takeoff(TakeoffManoeuvre, VerticalLoop):
         """
         until_s = min(until_s, self.window_s)
         runs = np.repeat(counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
-        altitude = fly_each(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::_SKETCH_EVERY]
+        altitude = fly_batch(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::_SKETCH_EVERY]
         settled = altitude[:, round(_SETTLED_S * RATE_HZ / _SKETCH_EVERY) :]
         too_high_m = np.maximum(altitude.max(axis=1) - (TARGET_M + _ASTRAY_M), 0.0)
         beyond = too_high_m + np.maximum((TARGET_M - _ASTRAY_M) - settled.min(axis=1), 0.0)

@@ -20,7 +20,8 @@ from app.core.experiments.base import (
 from app.core.experiments.integer_overflow import check_wrapping
 from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights
 from app.core.models.set_points import SetPoints
-from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, fly_each, observe
+from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
+from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.trajectory import Trajectory
 
@@ -87,7 +88,7 @@ class VerticalLoop(ModelledExperiment):
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, n)."""
-        return fly_each(counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
+        return fly_batch(counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
         """Difference of altitude and climb rate from the model's in every step of a flight, shape (n, 3).

@@ -29,7 +29,6 @@ from app.core.control.vertical_guidance import (
     FULL_THRUST,
     LARGEST_PRODUCT,
     LEVEL,
-    NOMINAL_HOVER_THROTTLE,
     POSITION_BITS,
     RATE_HZ,
     SPEED_BITS,
@@ -103,7 +102,7 @@ def sensed(history: Samples, step: int, delay_steps: float) -> float:
 def decay(x: float) -> float:
     """exp(−x) for x ≥ 0, accurate to 1e-13.
 
-    Multiplications only, so identical on every machine.
+    Multiplications only, so identical on every machine, and vectorisable over runs.
     """
     part = max(-x, -64.0) * (1 / 128)
     power = 1.0 + part * (1.0 + part * (1 / 2 + part * (1 / 6 + part * (1 / 24 + part * (1 / 120 + part * (1 / 720))))))
@@ -289,15 +288,6 @@ def fly(gains: Counts, model: Samples, set_points: SetPoints, samples: int) -> t
     """One flight with every channel: shape (6, samples) in the order of `CHANNELS`, and the largest |product|."""
     channels = np.empty((len(CHANNELS), samples))
     return channels, rollout(gains, model, set_points.targets, None, channels)
-
-
-def reference_altitude(set_points: SetPoints, samples: int) -> Samples:
-    """The loop's reference, m up, in every step of a flight that starts with the command, shape (samples,): that of any
-    vehicle with any gains."""
-    model = np.zeros(BATTERY_SAG + 1)
-    model[HOVER_THROTTLE] = NOMINAL_HOVER_THROTTLE
-    channels, _ = fly(np.zeros(3, dtype=np.int64), model, set_points, samples)
-    return np.asarray(channels[CHANNELS.index("reference_m")])
 
 
 def fly_each(

@@ -15,7 +15,7 @@ from app.core.errors import TrajectoryError
 from app.core.experiments.step_sequence import REFERENCE, SETTLED_FOR_S
 from app.core.formatting import capitalised, count
 from app.core.models.set_points import SetPoints, on_step
-from app.core.models.vertical import reference_altitude
+from app.core.models.vertical_batch import reference_altitude
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import Samples, Trajectory

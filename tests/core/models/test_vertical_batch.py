@@ -1,4 +1,4 @@
-"""Flights of the simple model: their start latency, their targets, the ground effect's decay."""
+"""Takeoffs flown side by side, against the same takeoffs flown one by one."""
 
 import numpy as np
 import pytest
@@ -9,12 +9,15 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical import (
     BATTERY_SAG,
+    MEASUREMENT_DELAY_S,
     START_LATENCY_S,
     Counts,
     decay,
     fly_each,
 )
+from app.core.models.vertical_batch import BATCH_WIDTH, are_exact, fly_batch
 
+SET_POINTS = SetPoints((0.0,), (3.0,))
 SAMPLES = 2000
 """Past the second in which the loop finds out that it flies."""
 
@@ -33,6 +36,34 @@ def models(count: int) -> Matrix:
 
 def gain_sets(count: int) -> Counts:
     return np.random.default_rng(2).integers((100, 0, 30), (4000, 1073, 409), size=(count, 3))
+
+
+def one_by_one(gains: Counts, each: Matrix) -> Matrix:
+    return fly_each(gains, each, SET_POINTS, SAMPLES)
+
+
+def test_side_by_side_is_bit_for_bit_one_by_one() -> None:
+    gains, each = gain_sets(BATCH_WIDTH + 2), models(BATCH_WIDTH + 2)
+    assert np.array_equal(fly_batch(gains, each, SET_POINTS, SAMPLES), one_by_one(gains, each))
+
+
+def test_gains_whose_products_wrap_fly_as_the_autopilot_wraps_them() -> None:
+    gains, each = gain_sets(3), models(3)
+    gains[1] = (1600, 1023, 3000)
+    assert are_exact(gains).tolist() == [True, False, True]
+    assert np.array_equal(fly_batch(gains, each, SET_POINTS, SAMPLES), one_by_one(gains, each))
+
+
+def test_a_measurement_delay_beyond_what_lanes_remember_is_flown_alone() -> None:
+    gains, each = gain_sets(2), models(2)
+    each[1, MEASUREMENT_DELAY_S] = 0.2
+    assert np.array_equal(fly_batch(gains, each, SET_POINTS, SAMPLES), one_by_one(gains, each))
+
+
+def test_later_set_points_are_flown_side_by_side_as_one_by_one() -> None:
+    gains, each = gain_sets(3), models(3)
+    steps = SetPoints((0.0, 1.0, 2.5), (2.0, 1.5, 2.25))
+    assert np.array_equal(fly_batch(gains, each, steps, SAMPLES), fly_each(gains, each, steps, SAMPLES))
 
 
 def test_a_latency_shifts_the_climb_and_leaves_later_set_points_at_their_times() -> None:
