@@ -80,8 +80,7 @@ def rollout(
         elevator = min(max(elevator, LOWEST_ELEVATOR_DEG), HIGHEST_ELEVATOR_DEG)
         errors[i] = error
         if len(detail) > 0:
-            for j in range(STATES):
-                detail[i, j] = memory[j]
+            detail[i, :STATES] = memory[:STATES]
             detail[i, REFERENCE], detail[i, THRUST], detail[i, ELEVATOR] = reference, thrust, elevator
         if abs(error) >= LARGEST_ERROR_RAD:
             memory[DIVERGED] = 1.0
@@ -93,8 +92,7 @@ def rollout(
                 total += transition[j, k] * memory[k]
             moved[j] = total + bias[i, j] if len(bias) > 0 else total
         memory[DISTANCE] += STEP_S * (AIRSPEED_FT_S + 0.5 * (memory[SPEED] + moved[SPEED]))
-        for j in range(STATES):
-            memory[j] = moved[j]
+        memory[:STATES] = moved
 
 
 def track(gains: Samples, transition: Samples, samples: int) -> tuple[Samples, Samples]:

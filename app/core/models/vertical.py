@@ -78,10 +78,8 @@ def delay_by(signal: Samples, steps: float) -> None:
     """Delay a signal by a fractional number of steps, in place; before its first sample it was at rest at 0."""
     whole = int(steps)
     part = steps - whole
-    for i in range(len(signal) - 1, -1, -1):
-        late = signal[i - whole] if i >= whole else 0.0
-        later = signal[i - whole - 1] if i > whole else 0.0
-        signal[i] = (1.0 - part) * late + part * later
+    before = np.concatenate((np.zeros(whole + 1), signal))
+    signal[:] = (1.0 - part) * before[1 : len(signal) + 1] + part * before[: len(signal)]
 
 
 @kernel
@@ -106,13 +104,9 @@ def decay(x: float) -> float:
     """
     part = max(-x, -64.0) * (1 / 128)
     power = 1.0 + part * (1.0 + part * (1 / 2 + part * (1 / 6 + part * (1 / 24 + part * (1 / 120 + part * (1 / 720))))))
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    return power * power
+    for _ in range(7):
+        power *= power
+    return power
 
 
 @kernel

@@ -185,8 +185,7 @@ def follow(
     """
     _control_velocity(state, p, recorded[V_T], v, lower, upper)
     _control_acceleration(state, p, recorded[A_T], a, lower, upper)
-    for place in range(len(OUTPUTS)):
-        state[place] = recorded[place]
+    state[: len(OUTPUTS)] = recorded
     state[POSITION_ERROR] = recorded[Z_D] - z
     state[UNFILTERED] = 0.0
 
@@ -289,18 +288,15 @@ def rollout(
         lower, upper = inputs[row, 4] > 0.0, inputs[row, 5] > 0.0
         follows = followed[row] and state[PHASE] == FLIGHT
         if follows:
-            for place in range(STATE_SIZE):
-                before[place] = state[place]
+            before[:] = state
         if state[PHASE] == FLIGHT:
             shape(state, p, target)
             control(state, p, z, v, a, lower, upper)
         else:
             take_off(state, p, z, v, a)
-        for place in range(len(OUTPUTS)):
-            outputs[row, place] = state[place]
+        outputs[row] = state[: len(OUTPUTS)]
         if follows:
-            for place in range(STATE_SIZE):
-                state[place] = before[place]
+            state[:] = before
             follow(state, p, recorded[row], z, v, a, lower, upper)
 
 
