@@ -140,7 +140,7 @@ class CopterModel(LimitedModel[Copter]):
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
         self._log: Final = self._logs[self.base.number]
         self._experiment: Final = experiment.exactly_under(self.base.parameters)
-        self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
+        self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values(), for_campaign=True)
         if (why := find_unexplained(self._estimate)) is not None:
             worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
             raise _unlike(worst, why.text)
