@@ -12,7 +12,7 @@ from app.autopilots.ardupilot.replica.parameters import Parameters
 from app.autopilots.px4.replica import parameters as px4_parameters
 from app.core.records.trajectory import Samples
 from bench.copters.px4_simulation import fly_reference
-from bench.copters.simulation import fly_targets
+from bench.copters.simulation import SimulatedCopter, fly_targets
 from tests.core.analysis.flights import QUIET
 from tests.core.analysis.px4_flights import CALM
 from tests.logs.recorded import Telemetry
@@ -58,16 +58,30 @@ class Signals:
 
 @cache
 def flown(autopilot: Autopilot, set_points: tuple[tuple[float, float], ...], lasts_s: float = 18.0) -> Signals:
+    """A flight of a quiet vehicle along these set points."""
+    return fly(autopilot, QUIET if autopilot == "ardupilot" else CALM, set_points, lasts_s)
+
+
+def fly(
+    autopilot: Autopilot,
+    copter: SimulatedCopter,
+    set_points: tuple[tuple[float, float], ...],
+    lasts_s: float,
+    *,
+    seed: int = 1,
+) -> Signals:
     """A flight from hover along these set points (from when on, altitude)."""
     step_s, every = (0.0025, 8) if autopilot == "ardupilot" else (px4_parameters.STEP_S, 2)
     time_s = step_s * np.arange(round(lasts_s / step_s))
     times_s, altitudes_m = np.array(set_points).T
     target_m = altitudes_m[np.searchsorted(times_s, time_s, side="right") - 1]
     if autopilot == "ardupilot":
-        rows = fly_targets(QUIET, Parameters(hover_throttle=0.35), target_m, seed=1)[::every]
+        parameters = Parameters(hover_throttle=copter.assumed_hover_throttle)
+        rows = fly_targets(copter, parameters, target_m, seed=seed)[::every]
         return Signals(rows[:, 0], rows[:, 1], rows[:, 7], target_m[::every], rows[:, 3])
     reference = np.column_stack([target_m, np.zeros((len(target_m), 2))])
-    rows = fly_reference(CALM, px4_parameters.Parameters(hover_thrust=0.4), reference, seed=1)[::every]
+    parameters_of_px4 = px4_parameters.Parameters(hover_thrust=copter.assumed_hover_throttle)
+    rows = fly_reference(copter, parameters_of_px4, reference, seed=seed)[::every]
     return Signals(rows[:, 0], rows[:, 1], rows[:, 3], target_m[::every], target_m[::every])
 
 
@@ -77,7 +91,7 @@ class Recording:
 
     `every` is that of its messages that is sent, `without` those that are not. The parameters, but for those `unread`,
     are read before the flight, or after it; those in `changes` are written in flight. Throttles above `full_from` are
-    full. The log begins in the air.
+    full. The log begins in the air. `signals` are of this flight, by default a quiet vehicle's.
     """
 
     autopilot: Autopilot = "ardupilot"
@@ -97,6 +111,7 @@ class Recording:
     full_from: float = 1.0
     lean_rad: float = 0.0
     boots_at_s: float | None = None
+    signals: Signals | None = None
 
     @property
     def content(self) -> bytes:
@@ -117,7 +132,7 @@ class Recording:
                 log.vehicle("param_value", name.encode(), value, 9, 900, 0)
 
     def _fly(self, log: Telemetry) -> None:
-        signals = flown(self.autopilot, self.set_points, self.lasts_s)
+        signals = self.signals or flown(self.autopilot, self.set_points, self.lasts_s)
         step_s = self.lasts_s / len(signals.altitude_m)
         changes = list(self.changes)
         mode = _MODE[self.autopilot] if self.mode is None else self.mode

@@ -6,13 +6,15 @@ The throttle also answers to disturbances, which would bias an ordinary regressi
 loop lowers the throttle. The reference does not answer to them, so throttle and climb rate are first projected on the
 climb rate and acceleration that follow from it (two-stage least squares). Gusts last from row to row, which makes the
 result less certain than as many independent rows would: gusts that decay exponentially beside noise that does not last
-are an autoregressive moving average, found by its likelihood. The motors' lag is not linear in this equation: each
-value of a grid is weighed by what it leaves that follows the reference, and by what is usual.
+are an autoregressive moving average, which is taken out of the rows. Neither it nor the motors' lag is linear in this
+equation: each value of a grid is weighed, the noises by their likelihood, the lags by what they leave that follows the
+reference, and by what is usual.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -35,6 +37,8 @@ _GENERATOR: Final = (1, 7, 9, 15)
 """Of a lattice of so many points with even margins, whose normal scores correlate least."""
 _INSTRUMENT_ROWS: Final = 4
 _FEW: Final = 5
+_NEGLIGIBLE: Final = -4.0
+"""Logarithm of a likelihood beside that of the likeliest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,11 +68,6 @@ class _Noise:
     def whitened(self, values: Samples) -> Samples:
         """Rows, shape (n, …), without the correlation of this noise."""
         return _filtered(values, -self.decay, -self.smoothing)
-
-    def covariance(self, values: Samples) -> Samples:
-        """Covariance of the products of `values`, shape (n, k), with such noise of unit innovations, (k, k)."""
-        coloured = _filtered(values[::-1], -self.smoothing, -self.decay)
-        return np.asarray(coloured.T @ coloured)
 
 
 def _filtered(values: Samples, before: float, behind: float) -> Samples:
@@ -108,21 +107,17 @@ class _Rows:
         return float(np.sum(self.left**2)) / int(rows - causes)
 
     def whitened(self, noise: _Noise) -> "_Rows":
-        """The rows without the correlation of this noise."""
-        return _with_instruments(self.lag_s, *map(noise.whitened, (self.sought, self.causes, self.instruments)))
+        """The rows without the correlation of this noise, from the second on: the first is not free of what was before
+        it."""
+        signals = (self.sought, self.causes, self.instruments)
+        return _with_instruments(self.lag_s, *(noise.whitened(each)[1:] for each in signals))
 
     def log_likelihood(self, noise: _Noise) -> float:
         """Logarithm of the restricted likelihood of this noise."""
         white = self.whitened(noise)
-        rows, causes = self.causes.shape
+        rows, causes = white.causes.shape
         log_determinant = float(np.linalg.slogdet(white.projected.T @ white.projected).logabsdet)
         return -0.5 * (int(rows - causes) * math.log(white.variance) + log_determinant)
-
-    def independent_variance(self, noise: _Noise) -> float:
-        """Variance of independent rows that would make the slope as uncertain as this noise does."""
-        inverse = np.linalg.inv(self.projected.T @ self.projected)
-        uncertainty = inverse @ noise.covariance(self.projected) @ inverse
-        return self.whitened(noise).variance * float(uncertainty[0, 0] / inverse[0, 0])
 
 
 def _with_instruments(lag_s: float, sought: Samples, causes: Samples, instruments: Samples) -> _Rows:
@@ -132,8 +127,8 @@ def _with_instruments(lag_s: float, sought: Samples, causes: Samples, instrument
 
 @dataclass(frozen=True, slots=True)
 class _Regression:
-    """Result for one lag: mean, shape (3,), and covariance, (3, 3), of slope, −drag/g and −slope·log h, and the
-    logarithm of the likelihood."""
+    """Result for one lag and noise: mean, shape (3,), and covariance, (3, 3), of slope, −drag/g and −slope·log h, and
+    the logarithm of the likelihood."""
 
     lag_s: float
     mean: Samples
@@ -151,9 +146,8 @@ def fit_copter(*flights: LoggedFlight) -> CopterEstimate:
     ]
     candidates = [_rows(parts, lag_s) for lag_s in _LAGS_S.tolist()]
     best = min(candidates, key=lambda each: each.variance)
-    variance = best.independent_variance(max(_NOISES, key=best.log_likelihood))
-    regressions = [_regress(each, variance, loop) for each in candidates]
     usual_s, deviation_s = USUAL_LAG_S
+    regressions = sorted(_regressions(candidates, best, loop), key=attrgetter("lag_s"))
     log_weight = np.array(
         [each.log_likelihood - 0.5 * ((each.lag_s - usual_s) / deviation_s) ** 2 for each in regressions]
     )
@@ -200,9 +194,19 @@ def _before(values: Samples, *, rows: int) -> Samples:
     return np.asarray(values[np.maximum(np.arange(len(values)) - rows, 0)])
 
 
-def _regress(rows: _Rows, variance: float, loop: AltitudeLoop) -> _Regression:
+def _regressions(candidates: Sequence[_Rows], best: _Rows, loop: AltitudeLoop) -> Iterator[_Regression]:
+    """Of the rows for each lag under each noise that is not negligible beside the likeliest."""
+    likelihood = {noise: best.log_likelihood(noise) for noise in _NOISES}
+    largest = max(likelihood.values())
+    for noise, found in likelihood.items():
+        if found - largest > _NEGLIGIBLE:
+            variance = best.whitened(noise).variance
+            yield from (_regress(each.whitened(noise), variance, loop, found - largest) for each in candidates)
+
+
+def _regress(rows: _Rows, variance: float, loop: AltitudeLoop, log_share: float) -> _Regression:
     """Two-stage least squares with the usual slope and drag as further observations; `variance` is that of independent
-    rows."""
+    rows, and `log_share` the likelihood of their noise."""
     usual = np.array([loop.usual_slope[0], -USUAL_DRAG_1_S[0] / GRAVITY_M_S2, 0.0])
     certainty = np.diag([loop.usual_slope[1] ** -2, (USUAL_DRAG_1_S[1] / GRAVITY_M_S2) ** -2, 0.0])
     information = rows.projected.T / variance
@@ -211,7 +215,7 @@ def _regress(rows: _Rows, variance: float, loop: AltitudeLoop) -> _Regression:
     explained = np.sum((rows.instruments.T @ (rows.sought - rows.causes @ mean)) ** 2)
     with_hover = np.array([1.0, 0.0, mean[2] / mean[0]])
     covariance += loop.slope_error**2 * np.outer(with_hover, with_hover)
-    return _Regression(rows.lag_s, mean, covariance, -0.5 * float(explained) / variance)
+    return _Regression(rows.lag_s, mean, covariance, log_share - 0.5 * float(explained) / variance)
 
 
 def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Samples:
@@ -223,14 +227,17 @@ def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Sa
 
 
 def _draws(regressions: Sequence[_Regression], weight: Samples) -> Samples:
-    """Equally probable copters, shape (k, 4): slope, drag, hover throttle, lag."""
-    from scipy.special import ndtri
+    """Equally probable copters, shape (k, 4): slope, drag, hover throttle, lag. A drag that drives is not drawn."""
+    from scipy.special import log_ndtr, ndtri, ndtri_exp
 
     quantiles = (np.arange(_DRAWS)[:, None] * _GENERATOR % _DRAWS + 0.5) / _DRAWS
     rows = []
     for lag_quantile, *others in quantiles:
         regression = regressions[int(np.searchsorted(np.cumsum(weight), lag_quantile))]
-        slope, drag, constant = regression.mean + np.linalg.cholesky(regression.covariance) @ ndtri(others)
+        root, normal = np.linalg.cholesky(regression.covariance), np.asarray(ndtri(others))
+        largest = -(regression.mean[1] + root[1, 0] * normal[0]) / root[1, 1]
+        normal[1] = ndtri_exp(math.log(others[1]) + log_ndtr(largest))
+        slope, drag, constant = regression.mean + root @ normal
         slope = max(slope, 0.2)
         rows.append((slope, max(-drag * GRAVITY_M_S2, 0.0), math.exp(-constant / slope), regression.lag_s))
     return np.array(rows)
