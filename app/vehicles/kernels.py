@@ -23,14 +23,17 @@ from app.core.control.vertical_guidance import (
 )
 from app.core.kernels import kernel
 from app.core.models.vertical import (
+    BATTERY_SAG,
     DRAG_1_S,
     GRAVITY_M_S2,
+    GROUND_EFFECT,
     MEASUREMENT_DELAY_S,
     MOTOR_LAG_S,
+    QUADRATIC_SHARE,
     advance,
+    lift_of,
     response_of,
     sensed,
-    thrust_to_weight,
 )
 
 Rows = NDArray[np.float64]
@@ -138,7 +141,16 @@ def fly_simple_model(
             sensed_m, sensed_m_s = sensed(past[0], now, delay), sensed(past[1], now, delay)
         share = control(autopilot, command, sensed_m + datum_m, sensed_m_s, 1.0, now >= resting_steps, rows[i])
         thrust += response * (share - thrust)
-        lift = thrust_to_weight(thrust, height, now * STEP_S, model, hover_force, ground_effect_height_m)
+        lift = lift_of(
+            thrust,
+            height,
+            now * STEP_S,
+            model[QUADRATIC_SHARE],
+            model[GROUND_EFFECT],
+            ground_effect_height_m,
+            model[BATTERY_SAG],
+            hover_force,
+        )
         height, climb = advance(height, climb, GRAVITY_M_S2 * (lift - 1.0) - model[DRAG_1_S] * climb + gusts_m_s2[i])
     plant[0], plant[1], plant[2] = height, climb, thrust
 

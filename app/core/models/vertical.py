@@ -110,16 +110,36 @@ def decay(x: float) -> float:
 
 
 @kernel
-def thrust_to_weight(
-    thrust: float, altitude: float, seconds: float, model: Samples, hover_force: float, ground_effect_height_m: float
+def lift_of(
+    thrust: float,
+    altitude: float,
+    seconds: float,
+    share: float,
+    ground: float,
+    ground_height: float,
+    sag: float,
+    hover_force: float,
 ) -> float:
-    """Thrust of the rotors in units of weight, by a model vector, shape (8,), and the force at hover throttle, a share
-    of full force."""
-    share, ground = model[QUADRATIC_SHARE], model[GROUND_EFFECT]
+    """Thrust of the rotors in units of weight; `hover_force` is the force at hover throttle, a share of full force."""
     ratio = ((1.0 - share) * thrust + share * thrust * thrust) / hover_force
     if ground > 0.0:
-        ratio *= 1.0 + ground * decay(altitude * (1.0 / ground_effect_height_m))
-    return float(ratio * (1.0 - model[BATTERY_SAG] * (1.0 / BATTERY_SAG_S) * seconds))
+        ratio *= 1.0 + ground * decay(altitude * (1.0 / ground_height))
+    return ratio * (1.0 - sag * (1.0 / BATTERY_SAG_S) * seconds)
+
+
+@kernel
+def thrust_to_weight(thrust: float, altitude: float, seconds: float, model: Samples, hover_force: float) -> float:
+    """The same with a model vector, shape (8,)."""
+    return lift_of(
+        thrust,
+        altitude,
+        seconds,
+        model[QUADRATIC_SHARE],
+        model[GROUND_EFFECT],
+        GROUND_EFFECT_HEIGHT_M,
+        model[BATTERY_SAG],
+        hover_force,
+    )
 
 
 @kernel
@@ -213,8 +233,7 @@ def fly_steps(
         else:
             channels[ALTITUDE, i], channels[CLIMB_RATE, i] = altitude, climb
         thrust += response * (command / FULL_THRUST - thrust)
-        since_start_s = now * STEP_S + latency
-        lift = thrust_to_weight(thrust, altitude, since_start_s, model, hover_force, GROUND_EFFECT_HEIGHT_M)
+        lift = thrust_to_weight(thrust, altitude, now * STEP_S + latency, model, hover_force)
         altitude, climb = advance(altitude, climb, GRAVITY_M_S2 * (lift - 1.0) - drag * climb)
         if disturbances is not None:
             altitude += disturbances[i, ALTITUDE]
@@ -326,7 +345,7 @@ def observe(altitude: Samples, climb: Samples, thrust: Samples, model: Samples) 
         if i + 1 == len(altitude):
             break
         lagged += response * (thrust[i] - lagged)
-        lift = thrust_to_weight(lagged, altitude[i], i * STEP_S, model, hover_force, GROUND_EFFECT_HEIGHT_M)
+        lift = thrust_to_weight(lagged, altitude[i], i * STEP_S, model, hover_force)
         acceleration = GRAVITY_M_S2 * (lift - 1.0) - model[DRAG_1_S] * climb[i]
         height, speed = advance(altitude[i], climb[i], acceleration)
         found[i, ALTITUDE], found[i, CLIMB_RATE] = altitude[i + 1] - height, climb[i + 1] - speed
