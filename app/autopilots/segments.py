@@ -23,6 +23,7 @@ _DESCENT_M_S: Final = 0.1
 _DESCENT_S: Final = 1.0
 _UNSEEN_S: Final = 2.0
 """A touchdown that much later than the last row before it was not recorded."""
+_IDLE: Final = 0.05
 _ABOVE_GROUND_M: Final = 0.5
 _TELLING: Final = (EventKind.BOOT, EventKind.MOTORS_ON, EventKind.LIFT_OFF, EventKind.LANDING, EventKind.MOTORS_OFF)
 """Events after which it is known whether the vehicle is in the air, or not any more."""
@@ -77,7 +78,7 @@ def in_flight(
     if recording.in_air is not None:
         return _within(time_s, recording.in_air)
     lowest_m = np.min(altitude_m[np.isfinite(altitude_m)], initial=0.0)
-    is_up = (altitude_m > lowest_m + _ABOVE_GROUND_M) & ~(thrust <= 0.0)
+    is_up = (altitude_m > lowest_m + _ABOVE_GROUND_M) & ~(thrust <= _IDLE)
     if recording.armed is not None:
         return is_up & _within(time_s, recording.armed)
     flying, unknown_from_s = is_up, -np.inf

@@ -147,11 +147,14 @@ def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[T
 
 
 def _margins(recording: Recording, description: Description | None) -> UsualMargins | None:
-    """Margins with the hover throttle of a flight, if its gains are known."""
-    if description is None or not description.hover_throttle:
+    """Margins with the hover throttle of a flight, if its gains are known and it was no idling on the ground."""
+    hover_throttle = None if description is None else description.hover_throttle
+    if not hover_throttle:
         return None
-    loop = loop_of(recording, recording.columns["altitude_m"].time_s[-1], description.hover_throttle)
-    return None if loop is None else usual_margins(loop, description.hover_throttle)
+    loop = loop_of(recording, recording.columns["altitude_m"].time_s[-1], hover_throttle)
+    if loop is None or hover_throttle < loop.texts.hover_range[0]:
+        return None
+    return usual_margins(loop, hover_throttle)
 
 
 _OTHER_KIND: Final = ReasonCode.NOT_A_COPTER.key

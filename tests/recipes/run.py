@@ -103,8 +103,8 @@ RECIPES: Final = {
             line(
                 "app.figures", "from app.figures.flown_order import FlownOrderFigure", before="from app.figures.gains"
             ),
-            line("app.figures", '        "order": FlownOrderFigure,', before='        "gains": GainsFigure'),
-            Change("app.campaigns.router", '"errors", "gains"]', '"errors", "gains", "order"]'),
+            line("app.figures", '    "order": FlownOrderFigure,', before='    "gains": GainsFigure'),
+            Change("app.figures", '"errors", "gains"]', '"errors", "gains", "order"]'),
         ),
     ),
 }

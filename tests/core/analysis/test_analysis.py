@@ -66,7 +66,7 @@ def test_the_documented_rule_follows_the_hover_throttle() -> None:
 
 
 def test_too_much_gust_for_the_slope_says_what_to_fly() -> None:
-    found = analyze(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3))
+    found = analyze(simulated_flight(replace(GUSTY, gust_m_s2=0.8, quadratic=0.4), seed=3))
     assert found.proposed is None
     assert found.why_none is not None
     assert (found.grade, found.why_none.code.key) == (Grade.PARTIAL, "slope_unknown")
