@@ -47,6 +47,7 @@ from app.core.models.copter import (
     Filter,
     accelerometer_filter,
     filtered,
+    low_pass,
     start_body,
 )
 from app.core.models.set_points import SetPoints
@@ -176,7 +177,7 @@ class ArduPilotLoop(CopterLoop):
         p = self.parameters.position_p_1_s
         sought_m = segment.z_d_m - segment.z_d_m[0] + segment.v_d_m_s / p
         gain = -np.expm1(-p * np.median(np.diff(segment.time_s)))
-        v_m_s = p * (sought_m - filtered(sought_m, (np.array([gain]), np.array([1.0, gain - 1.0]))))
+        v_m_s = p * (sought_m - filtered(sought_m, low_pass(gain)))
         return v_m_s, np.gradient(v_m_s, segment.time_s)
 
     def start(self, steps: Steps) -> tuple[float, float]:
@@ -287,7 +288,7 @@ def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: FlownStep
     z_d, v_d, a_d = (np.interp(rows_s, steps_s, reference[:, column]) for column in range(3))
     demanded = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
     gain = low_pass_gain(vertical.THROTTLE_FILTER_HZ, loop.step_s)
-    sent = filtered(demanded, (np.array([gain, 0.0]), np.array([1.0, gain - 1.0])))
+    sent = filtered(demanded, low_pass(gain))
     scored = (trajectory.time_s >= steps.begin_s) & (trajectory.time_s <= steps.end_s)
     moved = trajectory["throttle"] - np.interp(trajectory.time_s, steps_s, sent)
     return LoggedFlight(

@@ -61,7 +61,7 @@ class Copter:
 
 
 Filter = tuple[Samples, Samples]
-"""Numerator and denominator, shape (k,) each."""
+"""Numerator and denominator, of the same shape (k,)."""
 
 
 def accelerometer_filter(cutoff_hz: float, dt_s: float) -> Filter:
@@ -81,7 +81,11 @@ def accelerometer_filter(cutoff_hz: float, dt_s: float) -> Filter:
 
 def motor_filter(lag_s: float, dt_s: float) -> Filter:
     """The first-order lag of the motors."""
-    gain = dt_s / (dt_s + lag_s)
+    return low_pass(dt_s / (dt_s + lag_s))
+
+
+def low_pass(gain: float) -> Filter:
+    """The first-order filter that takes this share of each value."""
     return np.array([gain, 0.0]), np.array([1.0, gain - 1.0])
 
 
