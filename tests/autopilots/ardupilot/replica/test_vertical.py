@@ -10,6 +10,7 @@ import pytest
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
 from app.autopilots.ardupilot.replica.vertical import (
+    A_D,
     A_T,
     ACCELERATION_SUM,
     FLIGHT,
@@ -302,3 +303,15 @@ def test_a_rollout_takes_off_and_flies_on() -> None:
     assert np.diff(demand[:506]) == pytest.approx(0.00125, abs=6e-8)
     assert filtered[506] == demand[505]
     assert filtered[507] != demand[506]
+
+
+def test_a_loop_until_4_0_demands_the_change_of_its_climb_rate_target_as_acceleration() -> None:
+    """0.02 m below its target at rest: P·e = 1/s · 0.02 m, changed within a step; nothing in the step of a reset."""
+    parameters = Parameters(position_p_1_s=1.0)
+    state, packed = np.empty(STATE_SIZE), constants_of(parameters, differentiates=True)
+    start_hover(state, packed, 0.35, 5.0, 0.0, 0.0)
+    control(state, packed, 5.0, 0.0, 0.0, False, False)
+    assert state[A_D] == 0.0
+    control(state, packed, 4.98, 0.0, 0.0, False, False)
+    assert state[V_T] == pytest.approx(0.02)
+    assert state[A_D] == pytest.approx(0.02 / STEP_S)

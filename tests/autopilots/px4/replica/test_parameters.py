@@ -2,7 +2,14 @@ import math
 
 import pytest
 
-from app.autopilots.px4.replica.parameters import Parameters, low_pass_gain, parameters_from
+from app.autopilots.px4.replica.parameters import (
+    Parameters,
+    estimator_step_s,
+    in_accelerations,
+    in_thrusts,
+    low_pass_gain,
+    parameters_from,
+)
 from app.autopilots.px4.replica.vertical import DERIVATIVE_GAIN, VELOCITY_GAIN, packed
 from app.core.errors import InputError
 
@@ -37,3 +44,18 @@ def test_values_for_which_the_loop_is_not_defined_are_named(values: dict[str, fl
     with pytest.raises(InputError) as refusal:
         parameters_from(values)
     assert problem in str(refusal.value)
+
+
+def test_gains_of_a_share_of_thrust_are_those_of_an_acceleration_times_hover_thrust_over_gravity() -> None:
+    """0.2 at a hover thrust of 0.49033 are 4, the firmware's own factor of 20."""
+    older = {"MPC_Z_P": 1.0, "MPC_Z_VEL_P": 0.2, "MPC_Z_VEL_I": 0.02, "MPC_Z_VEL_D": 0.0}
+    later = in_accelerations(older, 0.4903325)
+    assert {name: later[name] for name in later if name.endswith("_ACC")} == pytest.approx(
+        {"MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 0.4, "MPC_Z_VEL_D_ACC": 0.0}
+    )
+    assert in_thrusts({name: later[name] for name in later if name not in older} | {"MPC_Z_P": 1.0}, 0.4903325) == older
+
+
+def test_the_loop_of_the_older_gains_ran_50_times_a_second() -> None:
+    assert estimator_step_s({"MPC_Z_VEL_P": 0.2}) == 0.02
+    assert estimator_step_s({"MPC_Z_VEL_P_ACC": 4.0}) == 0.01
