@@ -141,7 +141,7 @@ def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: 
 @pytest.mark.complete
 def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> None:
     path, parameters = tmp_path / "gusty.bin", tmp_path / "gains.param"
-    told = replace(GUSTY, gust_m_s2=0.6, quadratic=0.4, assumed_hover_throttle=0.4)
+    told = replace(GUSTY, gust_m_s2=0.8, quadratic=0.4, assumed_hover_throttle=0.4)
     path.write_bytes(ardupilot_log(simulated_flight(told, seed=3), parameters={**PARAMETERS, "MOT_THST_HOVER": 0.4}))
     result = analyze(path)
     assert result.exit_code == 0
