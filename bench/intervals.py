@@ -32,7 +32,7 @@ from bench.copters import made_logs
 from bench.copters.made_logs import MadeLog
 from bench.targets.made_takeoffs import ground_log
 
-SEED: Final = 20261202
+SEED: Final = 20261204
 QUICK_VEHICLES: Final = 8
 LIMITS: Final = (0.6, 1.0)
 """Least and largest share of all parameters of a kind that may lie in their intervals."""
@@ -65,8 +65,10 @@ def _of_copters(make: Callable[[np.random.Generator], MadeLog], number: int) -> 
 KINDS: Final[Mapping[str, Callable[[int], MadeLog]]] = {
     "ArduCopter's .bin": partial(_of_copters, made_logs.dataflash),
     "ArduCopter 4.1's .bin": partial(_of_copters, made_logs.dataflash_of_4_1),
+    "ArduCopter 3.6's .bin": partial(_of_copters, made_logs.dataflash_of_3_6),
     "ArduCopter's .tlog": partial(_of_copters, made_logs.telemetry_of_ardupilot),
     "PX4's .ulg": partial(_of_copters, made_logs.ulog),
+    "PX4 1.9's .ulg": partial(_of_copters, made_logs.ulog_of_1_9),
     "PX4's .tlog": partial(_of_copters, made_logs.telemetry_of_px4),
     "Paparazzi's .data": ground_log,
 }

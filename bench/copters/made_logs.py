@@ -17,9 +17,12 @@ from app.core.models.copter import GRAVITY_M_S2
 from app.core.records.trajectory import Samples
 from bench.copters import px4_simulation, simulation
 from bench.copters.simulation import SimulatedCopter, StepFlight, move, packed
+from tests.logs.copter_motions import older_steps
 from tests.logs.written import ardupilot_log
+from tests.logs.written_older_px4 import MOVE_S, Vehicle, Written, simulated
 from tests.logs.written_px4 import PARAMETERS as PX4_PARAMETERS
 from tests.logs.written_px4 import px4_log
+from tests.logs.written_releases import RELEASES
 from tests.logs.written_tlog import CLIMB_AND_DESCENT, PX4_RECORDING, Recording, fly
 
 _LEAD_S: Final = 2.0
@@ -37,15 +40,17 @@ class MadeLog:
     companion: bytes | None = None
 
 
-def truth_of(copter: SimulatedCopter, *, lasts_s: float, climb_rate_m_s: Samples, step_s: float) -> dict[str, float]:
-    """What the parameters of the model mean, of a vehicle whose flight begins to be analysed 2 s after its start.
+def truth_of(
+    copter: SimulatedCopter, *, lasts_s: float, climb_rate_m_s: Samples, step_s: float, begins_s: float = _LEAD_S
+) -> dict[str, float]:
+    """What the parameters of the model mean, of a vehicle whose flight begins to be analysed so long after its start.
 
     - hover throttle: carries the weight in the middle of what is analysed, where the battery has fallen that far;
     - thrust slope: of log thrust over log throttle, by a difference of 1 % to either side of that throttle;
     - drag: slope of the straight line through 0 that fits the drag best at the climb rates flown, shape (n,);
     - motor lag: how late the thrust follows a step of the throttle on average, with the dead time.
     """
-    at_rest, at_s = packed(replace(copter, motor_lag_s=0.0), step_s), 0.5 * (_LEAD_S + lasts_s)
+    at_rest, at_s = packed(replace(copter, motor_lag_s=0.0), step_s), 0.5 * (begins_s + lasts_s)
 
     def acceleration(throttle: float, climb_m_s: float = 0.0) -> float:
         return move(np.array([throttle, 0.0, climb_m_s]), at_rest, throttle, at_s, 0.0, step_s)
@@ -89,6 +94,28 @@ def _ardupilot(random: np.random.Generator, *, is_upward: bool) -> MadeLog:
     flight = simulation.fly_steps(copter, parameters, seed=_seed(random))
     named = flight.log.loop.firmware_parameters
     return MadeLog(ardupilot_log(flight.log, parameters=named, is_upward=is_upward), _truth(copter, flight, STEP_S))
+
+
+def dataflash_of_3_6(random: np.random.Generator) -> MadeLog:
+    """ArduCopter's .bin of release 3.6, with CTUN and RATE, of steps in ALT_HOLD or GUIDED."""
+    copter, seed, is_pilot = simulation.sample(random), _seed(random), bool(random.integers(2))
+    begins_s = (8.0 + float(random.uniform()), 15.0 + float(random.uniform()))
+    p_a = float(f"{copter.hover_throttle:.2g}")
+    gains = (("PSC_ACCZ_P", p_a), ("PSC_ACCZ_I", 2.0 * p_a))
+    motion = older_steps(feeds_rate=is_pilot, copter=copter, begins_s=begins_s, seed=seed, gains=gains)
+    content = RELEASES["3.6"].log(motion, parameters={"MOT_THST_HOVER": copter.assumed_hover_throttle})
+    truth = truth_of(copter, begins_s=6.0, lasts_s=24.0, climb_rate_m_s=motion.v_m_s, step_s=STEP_S)
+    return MadeLog(content, truth)
+
+
+def ulog_of_1_9(random: np.random.Generator) -> MadeLog:
+    """PX4's .ulg of release 1.9, with ten thrusts a second, of steps in offboard control or of a mission."""
+    copter, seed, manoeuvre = px4_simulation.sample_px4(random), _seed(random), ("steps", "smooth")[random.integers(2)]
+    changes_s = tuple((6.0 + 7.0 * np.arange(5) + random.uniform(size=5)).tolist())
+    vehicle = Vehicle(copter=copter, seed=seed, changes_s=changes_s)
+    climb_rate_m_s = -simulated(manoeuvre, vehicle)["position"]["vz"]
+    content = Written(layout="1.9", manoeuvre=manoeuvre, vehicle=vehicle).content
+    return MadeLog(content, truth_of(copter, lasts_s=40.0, climb_rate_m_s=climb_rate_m_s, step_s=MOVE_S))
 
 
 def ulog(random: np.random.Generator) -> MadeLog:

@@ -8,12 +8,13 @@ from functools import cache
 from typing import Final, Self
 
 import numpy as np
-from scipy.signal import butter
 
+from app.core.models.copter import accelerometer_filter
 from app.core.records.trajectory import Samples
 from app.logs.base import numbers
 from app.logs.boots import CLOCK
 from app.logs.dataflash import read_tables
+from bench.copters.simulation import SimulatedCopter, move, packed, weather_of
 from tests.logs.recorded import recorded
 
 STEP_S: Final = 1 / 400
@@ -90,8 +91,14 @@ def flown(name: str) -> Motion:
     )
 
 
-TRUTH: Final = {"hover_throttle": 0.42, "thrust_slope": 1.2, "motor_lag_s": 0.06, "drag_1_s": 0.3}
+COPTER: Final = SimulatedCopter(
+    hover_throttle=0.42, assumed_hover_throttle=0.4, quadratic=0.373, motor_lag_s=0.06, dead_time_s=0.0, drag_1_s=0.3,
+    drag_1_m=0.0, sag=0.0, gust_m_s2=0.2, noise_m_s2=0.03, wander_m_s=0.0, wander_m=0.0,
+)  # fmt: skip
 """The simulated vehicle; its acceleration is logged behind the firmware's two-pole filter of 20 Hz."""
+TRUTH: Final = {
+    name: getattr(COPTER.linear, name) for name in ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
+}
 OLDER: Final[Mapping[str, float]] = {
     **DEFAULTS,
     "PSC_POSZ_P": 1.5,
@@ -99,13 +106,13 @@ OLDER: Final[Mapping[str, float]] = {
     "PSC_ACCZ_P": 0.4,
     "PSC_ACCZ_I": 0.8,
 }
-_ASSUMED_HOVER: Final = 0.4
+_BEGINS_S: Final = (8.0, 15.0)
 
 
-def _profile(times_s: Samples) -> Samples:
-    """Climb rates of a target that goes up 2 m from 8 s on, and down again from 15 s on, with 1 m/s²."""
+def _profile(times_s: Samples, begins_s: tuple[float, float]) -> Samples:
+    """Climb rates of a target that goes up 2 m from one time on, and down again from another, with 1 m/s²."""
     rate = np.zeros_like(times_s)
-    for begin_s, sign in ((8.0, 1.0), (15.0, -1.0)):
+    for begin_s, sign in zip(begins_s, (1.0, -1.0), strict=True):
         since = times_s - begin_s
         rate += sign * np.clip(np.minimum(since, 3.0 - since), 0.0, 1.0)
     return rate
@@ -113,7 +120,13 @@ def _profile(times_s: Samples) -> Samples:
 
 @cache
 def older_steps(
-    *, feeds_rate: bool = True, bias_m_s: float = 0.0, gust_m_s2: float = 0.2, gains: tuple[tuple[str, float], ...] = ()
+    *,
+    feeds_rate: bool = True,
+    bias_m_s: float = 0.0,
+    gains: tuple[tuple[str, float], ...] = (),
+    copter: SimulatedCopter = COPTER,
+    begins_s: tuple[float, float] = _BEGINS_S,
+    seed: int = 7,
 ) -> Motion:
     """Steps of 2 m under the loop of releases 3.3 to 4.0 with these gains instead of `OLDER`, flying at 5 m from the
     beginning: the acceleration is demanded from the change of the climb rate target. Position targets of GUIDED move
@@ -122,29 +135,23 @@ def older_steps(
     g = {**OLDER, **dict(gains)}
     p_z, p_v, p_a, i_a, filter_hz = g.values()
     times_s = np.arange(0.0, 24.0, STEP_S)
-    rates = _profile(times_s)
-    random = np.random.default_rng(7)
-    noise = 0.1 * random.standard_normal(len(times_s))
-    gusts = gust_m_s2 * np.sqrt(2.0 * STEP_S / 0.5) * random.standard_normal(len(times_s))
-    (b0, b1, b2), (_, a1, a2) = butter(2, 20.0, fs=1.0 / STEP_S)
+    rates = _profile(times_s, begins_s)
+    weather = weather_of(copter, seed, len(times_s), STEP_S)
+    (b0, b1, b2), (_, a1, a2) = (each.tolist() for each in accelerometer_filter(20.0, STEP_S))
     k_v, k_a, k_u = (STEP_S / (STEP_S + 1.0 / (2.0 * np.pi * hz)) for hz in (4.0, filter_hz, 2.0))
-    h, slope, lag_s, drag = TRUTH.values()
-    z_d = z = 5.0
-    v = gust = error_v = error_a = 0.0
-    demanded = sent = motors = h
-    total = 1000.0 * (h - _ASSUMED_HOVER)
-    v_t = bias_m_s
-    x1 = x2 = y1 = y2 = 0.0
+    h, assumed, constants = copter.hover_throttle, copter.assumed_hover_throttle, packed(copter, STEP_S)
+    late = [h] * round(copter.dead_time_s / STEP_S)
+    moving = np.array([h, 5.0, 0.0])
+    z_d, error_v, error_a, v_t = 5.0, 0.0, 0.0, bias_m_s
+    demanded = sent = h
+    total = 1000.0 * (h - assumed)
+    sensed = memory_1 = memory_2 = 0.0
     rows = []
     for step, at_s in enumerate(times_s.tolist()):
+        gust, noise, error_of_v, error_of_z = weather[step].tolist()
         z_d += rates[step] * STEP_S
         v_d = rates[step] if feeds_rate else 0.0
-        a = G_M_S2 * ((motors / h) ** slope - 1.0) - drag * v + gust
-        sensed = a + noise[step]
-        x0 = sensed
-        y0 = b0 * x0 + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2
-        x2, x1, y2, y1 = x1, x0, y1, y0
-        estimated = v + bias_m_s
+        z, estimated, measured = moving[1] + error_of_z, moving[2] + error_of_v + bias_m_s, sensed + noise
         error = z_d - z
         linear = 1.0 / p_z**2
         before = v_t
@@ -153,16 +160,16 @@ def older_steps(
         change = (v_t - before) / STEP_S if step else 0.0
         error_v += k_v * (v_t - estimated - error_v)
         a_t = change + p_v * error_v
-        error_a += k_a * (100.0 * (a_t - y0) - error_a)
+        error_a += k_a * (100.0 * (a_t - measured) - error_a)
         total += i_a * error_a * STEP_S
         sent += k_u * (demanded - sent)
         if step % _ROW_EVERY == 0:
-            rows.append((at_s, z, estimated, y0, z_d, v_d, v_t, a_t, demanded, sent))
-        demanded = _ASSUMED_HOVER + (p_a * error_a + total) / 1000.0
-        motors += STEP_S / (STEP_S + lag_s) * (sent - motors)
-        gust += gusts[step] - gust * STEP_S / 0.5
-        v += a * STEP_S
-        z += v * STEP_S
+            rows.append((at_s, z, estimated, measured, z_d, v_d, v_t, a_t, demanded, sent))
+        demanded = assumed + (p_a * error_a + total) / 1000.0
+        late.append(sent)
+        a = move(moving, constants, late.pop(0), at_s, gust, STEP_S)
+        sensed = b0 * a + memory_1
+        memory_1, memory_2 = b1 * a - a1 * sensed + memory_2, b2 * a - a2 * sensed
     at, z_, v_, a_, z_d_, v_d_, v_t_, a_t_, throttle, filtered = np.array(rows).T
     return Motion(
         time_s=at + 20.0,
@@ -176,7 +183,7 @@ def older_steps(
         a_t_m_s2=a_t_,
         throttle=throttle,
         throttle_filtered=filtered,
-        hover=np.full(len(at), _ASSUMED_HOVER),
+        hover=np.full(len(at), assumed),
         modes=((10.0, ALT_HOLD if feeds_rate else GUIDED),),
         events=((10.0, 10), (12.0, 28), (50.0, 18)),
         gains=g,

@@ -25,6 +25,7 @@ from app.core.analysis.analysis import Grade
 from app.core.analysis.description import describe
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.margin import gain_margin
+from app.core.analysis.segment import Segment
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import InputError, TrajectoryError
 from app.core.models.copter import GRAVITY_M_S2
@@ -121,6 +122,15 @@ def test_the_vehicle_and_the_gains_of_older_steps_are_right(layout: str, manoeuv
     assert found.mean.hover_throttle == pytest.approx(known.hover_throttle, abs=0.003)
     for name in ("thrust_slope", "motor_lag_s", "drag_1_s"):
         assert abs(getattr(found.mean, name) - getattr(known, name)) < 3.0 * getattr(found.deviation, name), name
+
+
+def test_when_the_thrust_of_steps_jumped_between_ten_rows_a_second_is_not_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flight = flown(Written(layout="1.9"))
+    found = fit_copter(flight).deviation.motor_lag_s
+    monkeypatch.setattr(Segment, "jumps", property(lambda self: np.zeros(len(self.time_s))))
+    assert found > 1.2 * fit_copter(flight).deviation.motor_lag_s
 
 
 @pytest.mark.parametrize("layout", NEWER)

@@ -29,15 +29,38 @@ GAINS: Final[Mapping[str, float]] = MappingProxyType(
 )
 """Those of the recorded flights."""
 COPTER: Final = SimulatedCopter(
-    hover_throttle=0.42, assumed_hover_throttle=0.5, quadratic=0.3, motor_lag_s=0.05, dead_time_s=0.004, drag_1_s=0.3,
+    hover_throttle=0.42, assumed_hover_throttle=0.5, quadratic=0.3, motor_lag_s=0.05, dead_time_s=0.0, drag_1_s=0.3,
     drag_1_m=0.02, sag=0.01, gust_m_s2=0.1, noise_m_s2=0.1, wander_m_s=0.02, wander_m=0.01,
 )  # fmt: skip
-THR_HOVER, THR_MIN, THR_MAX = 0.5, 0.12, 0.9
-_MOVE_S, _CONTROL_EVERY = 0.004, 5
+THR_MAX: Final = 0.9
+MOVE_S: Final = 0.004
+_CONTROL_EVERY: Final = 5
 _HEIGHT_M = 5.0
 _LIFT_S, _LAND_S = 2.0, 16.0
 _CHANGES_S: Final = (6.02, 13.06, 20.04, 27.08, 34.0)
 """At other times between two rows each: a jump of the thrust just before a row looks earlier than it was."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """A vehicle under the law of the releases until 1.10, with gains and least thrust as its hover thrust asks for, in
+    the weather of `seed`, and when it changes its altitude."""
+
+    copter: SimulatedCopter = COPTER
+    seed: int = 1
+    changes_s: tuple[float, ...] = _CHANGES_S
+
+    @property
+    def gains(self) -> dict[str, float]:
+        share = self.copter.hover_throttle / COPTER.hover_throttle
+        return {name: value if name == "MPC_Z_P" else share * value for name, value in OLDER_GAINS.items()}
+
+    @property
+    def least_thrust(self) -> float:
+        return min(0.12, 0.4 * self.copter.hover_throttle)
+
+
+_VEHICLE: Final = Vehicle()
 
 Signals = Mapping[str, Samples]
 Motion = Mapping[str, Signals]
@@ -141,15 +164,17 @@ class Written:
     replaced: Mapping[tuple[str, str], float | tuple[float, ...]] = field(default_factory=dict)
     renamed: tuple[str, str] = ("", "")
     release: int | None = None
+    vehicle: Vehicle = _VEHICLE
 
     @property
     def content(self) -> bytes:
-        layout, motion = LAYOUTS[self.layout], motion_of(self.layout, self.manoeuvre)
+        layout, motion = LAYOUTS[self.layout], motion_of(self.layout, self.manoeuvre, self.vehicle)
         log = ULogFile()
         release = layout.release if self.release is None else self.release
         if release is not None:
             log.information("uint32_t ver_sw_release", release.to_bytes(4, "little"))
-        for name, value in parameters_of(self.layout).items() if self.parameters is None else self.parameters.items():
+        parameters = parameters_of(self.layout, self.vehicle) if self.parameters is None else self.parameters
+        for name, value in parameters.items():
             log.parameter(name, value)
         for topic, (subject, columns, every_s) in layout.topics.items():
             if topic not in self.without:
@@ -163,19 +188,20 @@ class Written:
         return log.content
 
 
-def parameters_of(layout: str) -> dict[str, float]:
+def parameters_of(layout: str, vehicle: Vehicle = _VEHICLE) -> dict[str, float]:
     """The gains and limits that its flights flew with."""
     if LAYOUTS[layout].older:
-        limits = {"MPC_THR_HOVER": THR_HOVER, "MPC_THR_MIN": THR_MIN, "MPC_THR_MAX": THR_MAX}
-        return {**OLDER_GAINS, **limits, "MPC_Z_VEL_MAX_UP": 3.0, "MPC_Z_VEL_MAX_DN": 1.5, "MAV_TYPE": 2}
+        hover = vehicle.copter.assumed_hover_throttle
+        limits = {"MPC_THR_HOVER": hover, "MPC_THR_MIN": vehicle.least_thrust, "MPC_THR_MAX": THR_MAX}
+        return {**vehicle.gains, **limits, "MPC_Z_VEL_MAX_UP": 3.0, "MPC_Z_VEL_MAX_DN": 1.5, "MAV_TYPE": 2}
     return {**GAINS, "MPC_THR_HOVER": 0.5, "MPC_Z_VEL_MAX_UP": 3.0, "MPC_Z_VEL_MAX_DN": 1.5, "MAV_TYPE": 2}
 
 
-def motion_of(layout: str, manoeuvre: str) -> Motion:
+def motion_of(layout: str, manoeuvre: str, vehicle: Vehicle) -> Motion:
     """Recorded where the loop was that of the recorded flights, but for the plain flight, which none of them is."""
     if LAYOUTS[layout].older:
-        return simulated(manoeuvre)
-    return recorded_motion(f"px4_{manoeuvre}.ulg") if manoeuvre != "plain" else simulated("plain")
+        return simulated(manoeuvre, vehicle)
+    return recorded_motion(f"px4_{manoeuvre}.ulg") if manoeuvre != "plain" else simulated("plain", vehicle)
 
 
 def _write(log: ULogFile, topic: str, columns: str, signals: Signals, every_s: float) -> None:
@@ -227,14 +253,15 @@ def recorded_motion(name: str) -> Motion:
 
 
 @cache
-def simulated(manoeuvre: str) -> Motion:
+def simulated(manoeuvre: str, vehicle: Vehicle) -> Motion:
     """A flight with the law of the releases until 1.10, from 20 s of the vehicle's clock on: "smooth" has altitude
     changes of a mission that feeds climb rates forward, "steps" those of offboard control, which does not."""
-    time_s = np.arange(0.0, {"steps": 40.0, "smooth": 40.0, "takeoff": 30.0, "plain": 25.0}[manoeuvre], _MOVE_S)
-    reference, rates = _references(manoeuvre, time_s)
-    flown = _flown(time_s, reference, rates, on_ground=manoeuvre == "takeoff")
+    time_s = np.arange(0.0, {"steps": 40.0, "smooth": 40.0, "takeoff": 30.0, "plain": 25.0}[manoeuvre], MOVE_S)
+    reference, rates = _references(manoeuvre, time_s, vehicle.changes_s)
+    flown = _flown(vehicle, time_s, reference, rates, on_ground=manoeuvre == "takeoff")
     rows = slice(None, None, _CONTROL_EVERY)
     z, v, v_t, thrust = flown[rows].T
+    hover = vehicle.copter.hover_throttle
     at_s = 20.0 + time_s[rows]
     still, lean = np.zeros(len(at_s)), np.full(len(at_s), 0.1)
     body = thrust / np.cos(lean)
@@ -247,7 +274,7 @@ def simulated(manoeuvre: str) -> Motion:
     return {
         "position": {"time_s": at_s, "z": -z, "vz": -v},
         "target": {
-            "time_s": at_s, "z": down["z"], "vz": -v_t, "az": -GRAVITY_M_S2 * (thrust / COPTER.hover_throttle - 1.0),
+            "time_s": at_s, "z": down["z"], "vz": -v_t, "az": -GRAVITY_M_S2 * (thrust / hover - 1.0),
             "tx": body * np.sin(lean), "ty": still, "tz": -thrust,
         },
         "set_point": {"time_s": at_s, **down, "az": np.full(len(at_s), np.nan)},
@@ -267,41 +294,44 @@ def simulated(manoeuvre: str) -> Motion:
     }  # fmt: skip
 
 
-def _references(manoeuvre: str, time_s: Samples) -> tuple[Samples, Samples]:
+def _references(manoeuvre: str, time_s: Samples, changes_s: tuple[float, ...]) -> tuple[Samples, Samples]:
     """Altitude and climb rate that are given, up."""
     if manoeuvre == "takeoff":
         rates = np.where(time_s < _LIFT_S + 1.0, 0.0, np.where(time_s < _LIFT_S + 3.0, 1.5, 0.0))
         rates = np.where(time_s > _LAND_S, -0.7, rates)
-        return np.cumsum(rates) * _MOVE_S, rates
+        return np.cumsum(rates) * MOVE_S, rates
     changes = np.zeros(len(time_s))
-    for number, begin_s in enumerate(_CHANGES_S if manoeuvre != "plain" else ()):
+    for number, begin_s in enumerate(changes_s if manoeuvre != "plain" else ()):
         since = (time_s - begin_s) / (2.0 if manoeuvre == "smooth" else 1e-9)
         since = np.clip(since, 0.0, 1.0)
         changes += (-1.0) ** number * (10.0 * since**3 - 15.0 * since**4 + 6.0 * since**5)
     altitude = _HEIGHT_M + (1.5 if manoeuvre == "smooth" else 1.0) * changes
-    return altitude, np.gradient(altitude, _MOVE_S) if manoeuvre == "smooth" else np.zeros(len(time_s))
+    return altitude, np.gradient(altitude, MOVE_S) if manoeuvre == "smooth" else np.zeros(len(time_s))
 
 
-def _flown(time_s: Samples, reference: Samples, rates: Samples, *, on_ground: bool) -> Samples:
+def _flown(vehicle: Vehicle, time_s: Samples, reference: Samples, rates: Samples, *, on_ground: bool) -> Samples:
     """Altitude, climb rate, its target and thrust, up, shape (n, 4): position control 50 times a second."""
-    weather, copter = weather_of(COPTER, 1, len(time_s), _MOVE_S, climb_rate_wander_s=0.6), packed(COPTER, _MOVE_S)
-    moving = np.array([0.0 if on_ground else COPTER.hover_throttle, reference[0], 0.0])
-    integral, thrust, v_t, before = (0.0 if on_ground else COPTER.hover_throttle - THR_HOVER), moving[0], 0.0, 0.0
-    flown, control_s = np.empty((len(time_s), 4)), _CONTROL_EVERY * _MOVE_S
-    gains = OLDER_GAINS
+    weather = weather_of(vehicle.copter, vehicle.seed, len(time_s), MOVE_S, climb_rate_wander_s=0.6)
+    copter, late = packed(vehicle.copter, MOVE_S), round(vehicle.copter.dead_time_s / MOVE_S)
+    hover, assumed = vehicle.copter.hover_throttle, vehicle.copter.assumed_hover_throttle
+    moving = np.array([0.0 if on_ground else hover, reference[0], 0.0])
+    integral, thrust, v_t, before = (0.0 if on_ground else hover - assumed), moving[0], 0.0, 0.0
+    flown, control_s = np.empty((len(time_s), 4)), _CONTROL_EVERY * MOVE_S
+    gains = vehicle.gains
     for row, at_s in enumerate(time_s.tolist()):
         z, v = moving[1] + weather[row, 3], moving[2] + weather[row, 2]
         if row % _CONTROL_EVERY == 0:
             v_t = float(np.clip(gains["MPC_Z_P"] * (reference[row] - z) + rates[row], -1.5, 3.0))
             rate, before = (v - before) / control_s, v
-            wanted = gains["MPC_Z_VEL_P"] * (v_t - v) + integral - gains["MPC_Z_VEL_D"] * rate + THR_HOVER
-            thrust = float(np.clip(wanted, THR_MIN, THR_MAX))
+            wanted = gains["MPC_Z_VEL_P"] * (v_t - v) + integral - gains["MPC_Z_VEL_D"] * rate + assumed
+            thrust = float(np.clip(wanted, vehicle.least_thrust, THR_MAX))
             if thrust == wanted:
                 integral += gains["MPC_Z_VEL_I"] * (v_t - v) * control_s
             if on_ground and (at_s < _LIFT_S or (at_s > _LAND_S and z < 0.05)):
                 thrust, integral = 0.0, 0.0
         flown[row] = z, v, v_t, thrust
-        move(moving, copter, thrust, at_s, weather[row, 0] if moving[1] > 0.0 else 0.0, _MOVE_S)
+        sent = flown[max(row - late, 0), 3]
+        move(moving, copter, sent, at_s, weather[row, 0] if moving[1] > 0.0 else 0.0, MOVE_S)
         if moving[1] < 0.0:
             moving[1], moving[2] = 0.0, max(moving[2], 0.0)
     return flown

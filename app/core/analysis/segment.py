@@ -58,8 +58,22 @@ class Segment:
         return np.asarray(self.time_s >= self.time_s[0] + LEAD_S)
 
     def motor_throttle(self, time_s: Samples) -> Samples:
-        """What the motors get at these times within the segment, shape (m,), between its rows."""
-        return _smooth(self.time_s, self.throttle_filtered, time_s)
+        """What the motors get at these times within the segment, shape (m,)."""
+        from scipy.interpolate import PchipInterpolator
+
+        return np.asarray(PchipInterpolator(*self.motor_rows)(time_s))
+
+    @property
+    def motor_rows(self) -> tuple[Samples, Samples]:
+        """What the motors get, shape (k,), and when: increasing times, which begin and end with the rows; k ≥ 3."""
+        return self.time_s, self.throttle_filtered
+
+    @property
+    def jumps(self) -> Samples:
+        """How far the throttle of the motors is from the middle of that before and that behind, at each row, shape
+        (n,)."""
+        time_s, values = self.motor_rows
+        return np.interp(self.time_s, time_s[1:-1], values[1:-1] - 0.5 * (values[2:] + values[:-2]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,9 +84,9 @@ class FinerSegment(Segment):
     motor_time_s: Samples
     motor_values: Samples
 
-    def motor_throttle(self, time_s: Samples) -> Samples:
-        """What the motors get at these times within the segment, shape (m,)."""
-        return _smooth(self.motor_time_s, self.motor_values, time_s)
+    @property
+    def motor_rows(self) -> tuple[Samples, Samples]:
+        return self.motor_time_s, self.motor_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,9 +123,3 @@ def interpolated(segment: Segment, step_s: float) -> Steps:
         v_m_s=between(segment.v_m_s, segment.a_m_s2),
         throttle_filtered=segment.motor_throttle(time_s),
     )
-
-
-def _smooth(time_s: Samples, values: Samples, wanted_s: Samples) -> Samples:
-    from scipy.interpolate import PchipInterpolator
-
-    return np.asarray(PchipInterpolator(time_s, values)(wanted_s))

@@ -3,18 +3,17 @@
     log(1 + a/g) = s·log u − s·log h − (drag/g)·v + disturbance
 
 The throttle also answers to disturbances, which would bias an ordinary regression: a gust raises the vehicle, and the
-loop lowers the throttle. The reference does not answer to them, so throttle and climb rate are first projected on the
-climb rate and acceleration that follow from it (two-stage least squares). Gusts last from row to row, which makes the
-result less certain than as many independent rows would: gusts that decay exponentially beside noise that does not last
-are an autoregressive moving average, which is taken out of the rows. Neither it nor the motors' lag is linear in this
-equation: each value of a grid is weighed, the noises by their likelihood, the lags by what they leave that follows the
-reference, and by what is usual.
+loop lowers the throttle. The reference does not answer to them, so the equation is required to hold on average beside
+the climb rates and accelerations that follow from it, the instruments (generalised method of moments). How well each of
+these averages holds depends on the noise: gusts that decay exponentially beside noise that does not last are an
+autoregressive moving average; and where the throttle jumps, nobody knows when between two rows it did. Neither the
+noise nor the motors' lag is linear in this equation: each value of a grid is weighed, the noises by their likelihood,
+the lags by what they leave that follows the reference, and by what is usual.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -30,6 +29,9 @@ USUAL_LAG_S: Final = (0.05, 0.05)
 
 _LAGS_S: Final = np.linspace(0.0, 0.25, 26)
 _ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
+_OF_JUMP: Final = 1.0 / math.sqrt(6.0)
+"""A jump at any time between two rows has a twelfth of its square as variance, and moves both from their middles by
+half of it."""
 _FREE_FALL: Final = -0.95
 _LEAST_THROTTLE: Final = 0.01
 _DRAWS: Final = 32
@@ -65,9 +67,12 @@ class _Noise:
     decay: float
     smoothing: float
 
-    def whitened(self, values: Samples) -> Samples:
-        """Rows, shape (n, …), without the correlation of this noise."""
-        return _filtered(values, -self.decay, -self.smoothing)
+    def covariance(self, values: Samples) -> Samples:
+        """Covariance of the products of `values`, shape (n, k), with such noise of unit innovations, (k, k)."""
+        before = np.vstack([np.zeros(values.shape[1]), values])
+        coloured = _filtered(before[::-1], -self.smoothing, -self.decay)
+        coloured[-1] /= math.sqrt(1.0 - self.decay**2)
+        return np.asarray(coloured.T @ coloured)
 
 
 def _filtered(values: Samples, before: float, behind: float) -> Samples:
@@ -86,43 +91,36 @@ _NOISES: Final = [
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Rows for one lag: log(1 + a/g), shape (n,), its causes, (n, 3), orthonormal instruments, (n, m), and the causes
-    projected on these, (n, 3)."""
+    """Rows for one lag: log(1 + a/g), shape (n,), its causes, (n, 3), and orthonormal instruments, (n, m), the same for
+    each lag."""
 
     lag_s: float
     sought: Samples
     causes: Samples
     instruments: Samples
-    projected: Samples
-
-    @property
-    def left(self) -> Samples:
-        """What two-stage least squares leaves, shape (n,)."""
-        return self.sought - self.causes @ np.linalg.lstsq(self.projected, self.sought, rcond=None)[0]
 
     @property
     def variance(self) -> float:
-        """Variance of what is left."""
+        """Variance of what two-stage least squares leaves."""
+        projection = self.instruments.T
+        found, *_ = np.linalg.lstsq(projection @ self.causes, projection @ self.sought, rcond=None)
         rows, causes = self.causes.shape
-        return float(np.sum(self.left**2)) / int(rows - causes)
+        return float(np.sum((self.sought - self.causes @ found) ** 2)) / int(rows - causes)
 
     def whitened(self, noise: _Noise) -> "_Rows":
         """The rows without the correlation of this noise, from the second on: the first is not free of what was before
         it."""
         signals = (self.sought, self.causes, self.instruments)
-        return _with_instruments(self.lag_s, *(noise.whitened(each)[1:] for each in signals))
+        sought, causes, instruments = (_filtered(each, -noise.decay, -noise.smoothing)[1:] for each in signals)
+        return _Rows(self.lag_s, sought, causes, np.linalg.qr(instruments).Q)
 
-    def log_likelihood(self, noise: _Noise) -> float:
-        """Logarithm of the restricted likelihood of this noise."""
-        white = self.whitened(noise)
-        rows, causes = white.causes.shape
-        log_determinant = float(np.linalg.slogdet(white.projected.T @ white.projected).logabsdet)
-        return -0.5 * (int(rows - causes) * math.log(white.variance) + log_determinant)
-
-
-def _with_instruments(lag_s: float, sought: Samples, causes: Samples, instruments: Samples) -> _Rows:
-    orthonormal, _ = np.linalg.qr(instruments)
-    return _Rows(lag_s, sought, causes, orthonormal, orthonormal @ (orthonormal.T @ causes))
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the restricted likelihood that they are independent."""
+        rows, causes = self.causes.shape
+        beside = self.instruments.T @ self.causes
+        log_determinant = float(np.linalg.slogdet(beside.T @ beside).logabsdet)
+        return -0.5 * (int(rows - causes) * math.log(self.variance) + log_determinant)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +144,9 @@ def fit_copter(*flights: LoggedFlight) -> CopterEstimate:
     ]
     candidates = [_rows(parts, lag_s) for lag_s in _LAGS_S.tolist()]
     best = min(candidates, key=lambda each: each.variance)
-    usual_s, deviation_s = USUAL_LAG_S
-    regressions = sorted(_regressions(candidates, best, loop), key=attrgetter("lag_s"))
-    log_weight = np.array(
-        [each.log_likelihood - 0.5 * ((each.lag_s - usual_s) / deviation_s) ** 2 for each in regressions]
-    )
+    jumps = np.concatenate([each.segment.jumps[each.segment.scored] for each in parts])
+    regressions = _regressions(candidates, best, jumps, loop)
+    log_weight = np.array([each.log_likelihood for each in regressions])
     weight = np.exp(log_weight - log_weight.max())
     values = _draws(regressions, weight / weight.sum())
     return CopterEstimate(
@@ -186,7 +182,7 @@ def _rows(parts: Sequence[_Part], lag_s: float) -> _Rows:
         for each in parts
     ]
     instruments = np.column_stack([np.concatenate(excited), ones])
-    return _with_instruments(lag_s, sought, causes, instruments)
+    return _Rows(lag_s, sought, causes, np.linalg.qr(instruments).Q)
 
 
 def _before(values: Samples, *, rows: int) -> Samples:
@@ -194,28 +190,35 @@ def _before(values: Samples, *, rows: int) -> Samples:
     return np.asarray(values[np.maximum(np.arange(len(values)) - rows, 0)])
 
 
-def _regressions(candidates: Sequence[_Rows], best: _Rows, loop: AltitudeLoop) -> Iterator[_Regression]:
-    """Of the rows for each lag under each noise that is not negligible beside the likeliest."""
-    likelihood = {noise: best.log_likelihood(noise) for noise in _NOISES}
-    largest = max(likelihood.values())
-    for noise, found in likelihood.items():
-        if found - largest > _NEGLIGIBLE:
-            variance = best.whitened(noise).variance
-            yield from (_regress(each.whitened(noise), variance, loop, found - largest) for each in candidates)
+def _regressions(candidates: Sequence[_Rows], best: _Rows, jumps: Samples, loop: AltitudeLoop) -> list[_Regression]:
+    """Of the rows for each lag, in their order, under each noise that is not negligible beside the likeliest. Where the
+    throttle jumps, rows with these `jumps`, shape (n,), are less certain."""
+    instruments, white = best.instruments, {noise: best.whitened(noise) for noise in _NOISES}
+    unseen = (loop.usual_slope[0] * _OF_JUMP * jumps / np.exp(best.causes[:, 0]))[:, None] * instruments
+    largest = max(each.log_likelihood for each in white.values())
+    likely = []
+    for noise, rows in white.items():
+        if rows.log_likelihood - largest > _NEGLIGIBLE:
+            covariance = rows.variance * noise.covariance(instruments) + unseen.T @ unseen
+            root = np.linalg.solve(np.linalg.cholesky(covariance), instruments.T)
+            likely.append((root, rows.log_likelihood - largest))
+    return [_regress(each, root, loop, log_share) for each in candidates for root, log_share in likely]
 
 
-def _regress(rows: _Rows, variance: float, loop: AltitudeLoop, log_share: float) -> _Regression:
-    """Two-stage least squares with the usual slope and drag as further observations; `variance` is that of independent
-    rows, and `log_share` the likelihood of their noise."""
+def _regress(rows: _Rows, root: Samples, loop: AltitudeLoop, log_share: float) -> _Regression:
+    """Least squares of averages that are independent and of variance 1, over rows with the weights `root`, shape
+    (m, n), with the usual slope and drag as further observations; `log_share` is the likelihood of the noise, to which
+    that of the lag is added."""
+    usual_s, deviation_s = USUAL_LAG_S
     usual = np.array([loop.usual_slope[0], -USUAL_DRAG_1_S[0] / GRAVITY_M_S2, 0.0])
     certainty = np.diag([loop.usual_slope[1] ** -2, (USUAL_DRAG_1_S[1] / GRAVITY_M_S2) ** -2, 0.0])
-    information = rows.projected.T / variance
-    covariance = np.asarray(np.linalg.inv(information @ rows.projected + certainty), dtype=np.float64)
-    mean = covariance @ (information @ rows.sought + certainty @ usual)
-    explained = np.sum((rows.instruments.T @ (rows.sought - rows.causes @ mean)) ** 2)
+    causes, sought = root @ rows.causes, root @ rows.sought
+    covariance = np.asarray(np.linalg.inv(causes.T @ causes + certainty), dtype=np.float64)
+    mean = covariance @ (causes.T @ sought + certainty @ usual)
+    misfit = float(np.sum((sought - causes @ mean) ** 2)) + ((rows.lag_s - usual_s) / deviation_s) ** 2
     with_hover = np.array([1.0, 0.0, mean[2] / mean[0]])
     covariance += loop.slope_error**2 * np.outer(with_hover, with_hover)
-    return _Regression(rows.lag_s, mean, covariance, log_share - 0.5 * float(explained) / variance)
+    return _Regression(rows.lag_s, mean, covariance, log_share - 0.5 * misfit)
 
 
 def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Samples:

@@ -88,3 +88,11 @@ def test_the_draws_have_the_stated_mean_and_deviation() -> None:
 
 def test_the_same_flight_gives_the_same_vehicle() -> None:
     assert fit_copter(simulated_flight(GUSTY)) == fit_copter(simulated_flight(GUSTY))
+
+
+def test_a_jump_of_the_throttle_between_two_rows_moves_both_by_half_of_it() -> None:
+    (rows,) = simulated_flight(QUIET).segments
+    found = replace(rows, throttle_filtered=np.where(rows.time_s < 8.0, 0.4, 0.5)).jumps
+    after = int(np.searchsorted(rows.time_s, 8.0))
+    assert found[after - 1 : after + 1] == pytest.approx([-0.05, 0.05])
+    assert np.abs(np.delete(found, [after - 1, after])).max() < 1e-9
