@@ -86,7 +86,7 @@ def analyze_content(
             vehicles = {each.system: each.autopilot.title for each in sorted(together, key=attrgetter("system"))}
         tuning = _tuning(reader, recording, name)
         is_other_kind = any(each.code == _OTHER_KIND for each in tuning.answer.reasons)
-        refused = _Answered(Refusal(reasons=tuning.answer.reasons), tuning.texts)
+        refused = _Answered(Refusal(reasons=tuning.answer.reasons), PartTexts(answer=_OF_ROTORS))
         replica = refused if is_other_kind else _compared(recording, name, gains)
     else:
         hint = f"For better gains use {ANALYSED}."
@@ -157,6 +157,7 @@ def _margins(recording: Recording, description: Description | None) -> UsualMarg
     return usual_margins(loop, hover_throttle)
 
 
+_OF_ROTORS: Final = "It is of a copter with several rotors, so the log is not compared with it."
 _OTHER_KIND: Final = ReasonCode.NOT_A_COPTER.key
 _DOUBTFUL: Final = frozenset(
     each.key

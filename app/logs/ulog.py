@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 
-from app.core.formatting import count, times
+from app.core.formatting import count, grouped, times
 from app.logs.base import Contents, Table, contents, refused
 
 _MAGIC: Final = b"ULog\x01\x12\x35"
@@ -67,7 +67,9 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], values: Colle
     changes = ((time_us / 1e6, name, value) for time_us, name, value in log.changed_parameters)
     settings = [*((-np.inf, name, value) for name, value in log.initial_parameters.items()), *changes]
     notes = [f"{count(sieve.damages, 'damaged section')} skipped"] if sieve.damages else []
-    notes += ["the file ends in the middle of a message"] if sieve.is_cut_off else []
+    if sieve.unread_bytes:
+        why = "the file ends in the middle of a message, or is damaged there"
+        notes.append(f"{why}: its last {grouped(sieve.unread_bytes)} bytes were not read")
     if log.dropouts:
         lost_s = sum(each.duration for each in log.dropouts) / 1000
         notes.append(f"the logger dropped data {times(len(log.dropouts))}, {lost_s:.2f} s in total")
@@ -97,14 +99,14 @@ def _joined(tables: Sequence[Table]) -> Table:
 
 @dataclass(slots=True)
 class _LogFilter:
-    """Filters the messages of a log. `damages` counts the sections that were skipped; `is_cut_off` tells that the last
-    message is not complete."""
+    """Filters the messages of a log. `damages` counts the sections that were skipped; `unread_bytes` are behind the
+    last message that is complete."""
 
     topics: Collection[str]
     values: Collection[str]
     kept: bytearray = field(default_factory=bytearray)
     damages: int = 0
-    is_cut_off: bool = False
+    unread_bytes: int = 0
     _formats: set[str] = field(default_factory=set)
     _subscribed: set[int] = field(default_factory=set)
     _appended: list[int] = field(default_factory=list)
@@ -128,7 +130,7 @@ class _LogFilter:
                 if self._is_wanted(kind, data, position + 3, end):
                     self.kept += data[position:end]
                 position = end
-        self.is_cut_off = position < size
+        self.unread_bytes = max(size - position, 0)
 
     def _is_wanted(self, kind: int, data: Contents, start: int, end: int) -> bool:
         match chr(kind):

@@ -40,7 +40,7 @@ export function readingsOf(flight: Description): Reading[] {
     {
       title: "In the air",
       value: withUnit(flight.flown_s, "s", 0),
-      detail: flight.held_s > 0 ? `${withUnit(flight.held_s, "s", 0)} with the altitude held` : "altitude not held",
+      ...(flight.held_s > 0 && { detail: `${withUnit(flight.held_s, "s", 0)} with the altitude held` }),
     },
     ...known(hover, (value) => ({
       title: "Hover throttle",
