@@ -185,7 +185,8 @@ def follow(
     """
     _control_velocity(state, p, recorded[V_T], v, lower, upper)
     _control_acceleration(state, p, recorded[A_T], a, lower, upper)
-    state[: len(OUTPUTS)] = recorded
+    for place in range(len(OUTPUTS)):
+        state[place] = recorded[place]
     state[POSITION_ERROR] = recorded[Z_D] - z
     state[UNFILTERED] = 0.0
 
@@ -211,14 +212,12 @@ def _bump(state: State, p: Packed, a: float) -> float:
 @kernel
 def _control_position(state: State, p: Packed, z: float) -> None:
     """Sets the climb rate target; a desired altitude further away than its limit is pulled along."""
-    error, before = state[Z_D] - z, state[V_T]
+    error = state[Z_D] - z
     limited = clip(error, state[POSITION_ERROR_MIN], state[POSITION_ERROR_MAX])
     if limited != error:
         state[Z_D] = z + limited
     state[POSITION_ERROR] = limited
     state[V_T] = square_root(limited, p[POSITION_P], p[ACCELERATION], 0.0) + state[V_D]
-    if p[DIFFERENTIATES] > 0.0:
-        state[A_D] = (state[V_T] - before) / p[DT] if state[RESET] == 0.0 else 0.0
 
 
 @kernel
@@ -288,16 +287,28 @@ def rollout(
         lower, upper = inputs[row, 4] > 0.0, inputs[row, 5] > 0.0
         follows = followed[row] and state[PHASE] == FLIGHT
         if follows:
-            before[:] = state
+            for place in range(STATE_SIZE):
+                before[place] = state[place]
         if state[PHASE] == FLIGHT:
             shape(state, p, target)
             control(state, p, z, v, a, lower, upper)
         else:
             take_off(state, p, z, v, a)
-        outputs[row] = state[: len(OUTPUTS)]
+        for place in range(len(OUTPUTS)):
+            outputs[row, place] = state[place]
         if follows:
-            state[:] = before
+            for place in range(STATE_SIZE):
+                state[place] = before[place]
             follow(state, p, recorded[row], z, v, a, lower, upper)
+
+
+@kernel
+def change_of_target(state: State, p: Packed, z: float) -> float:
+    """What a loop until 4.0 has in place of a desired acceleration, from its climb rate target of the step before; none
+    in the step of a reset."""
+    limited = clip(state[Z_D] - z, state[POSITION_ERROR_MIN], state[POSITION_ERROR_MAX])
+    target: float = square_root(limited, p[POSITION_P], p[ACCELERATION], 0.0) + state[V_D]
+    return (target - state[V_T]) / p[DT] if state[RESET] == 0.0 else 0.0
 
 
 @kernel
@@ -312,6 +323,8 @@ def step(
     """One step of loop and body. `reference` has shape (4,) as `REFERENCE`, of which the assumed hover throttle is not
     used: it is a parameter of the loop. `disturbance` has shape (3,) as `DISTURBANCES`."""
     state[Z_D], state[V_D], state[A_D] = reference[0], reference[1], reference[2]
+    if p[DIFFERENTIATES] > 0.0:
+        state[A_D] = change_of_target(state, p, body[ALTITUDE])
     filtered = state[THROTTLE_FILTERED]
     filtered += p[THROTTLE_GAIN] * (state[THROTTLE] - filtered)
     sensed = body[SENSED] + disturbance[2]
