@@ -10,6 +10,7 @@ import pytest
 from app.autopilots.ardupilot.replica.parameters import STEP_S, Parameters
 from app.autopilots.ardupilot.replica.replay import LoopTrace, replayed
 from app.autopilots.ardupilot.replica.vertical import (
+    A_D,
     A_T,
     ACCELERATION_SUM,
     FLIGHT,
@@ -17,6 +18,7 @@ from app.autopilots.ardupilot.replica.vertical import (
     PHASE,
     POSITION_P,
     RAMP,
+    RESET,
     SPOOL,
     STATE_SIZE,
     THROTTLE,
@@ -39,7 +41,9 @@ from app.autopilots.ardupilot.replica.vertical import (
 from app.autopilots.ardupilot.replica.vertical import (
     packed as constants_of,
 )
+from app.autopilots.ardupilot.replica.vertical import step as step_with_body
 from app.autopilots.ardupilot.replica_check import read_ardupilot_trace
+from app.core.models.copter import Copter, start_body
 
 TRACES = sorted((Path(__file__).parents[3] / "data" / "ardupilot_loop").glob("*.csv.gz"))
 TOLERANCES = np.array([1e-5, 2e-6, 1.2e-5, 4e-5, 1e-4, 0.01, 5e-5, 2e-5])
@@ -310,6 +314,11 @@ def test_a_loop_until_4_0_demands_the_change_of_its_climb_rate_target_as_acceler
     parameters = Parameters(position_p_1_s=1.0)
     state, packed = np.empty(STATE_SIZE), constants_of(parameters, differentiates=True)
     start_hover(state, packed, 0.35, 5.0, 0.0, 0.0)
-    assert change_of_target(state, packed, 4.98) == 0.0
     control(state, packed, 5.0, 0.0, 0.0, False, False)
-    assert change_of_target(state, packed, 4.98) == pytest.approx(0.02 / STEP_S)
+    copter = Copter(hover_throttle=0.35, thrust_slope=1.0, motor_lag_s=0.0, drag_1_s=0.0)
+    constants = copter.packed(filter_hz=0.0, dt_s=STEP_S)
+    body = start_body(0.35, 4.98, 0.0, 0.0, constants)
+    step_with_body(state, body, packed, constants, np.array([5.0, 0.0, 0.0, 0.35]), np.zeros(3))
+    assert state[A_D] == pytest.approx(0.02 / STEP_S)
+    state[RESET] = 1.0
+    assert change_of_target(state, packed, 4.98) == 0.0
