@@ -303,15 +303,6 @@ def rollout(
 
 
 @kernel
-def change_of_target(state: State, p: Packed, z: float) -> float:
-    """What a loop until 4.0 has in place of a desired acceleration, from its climb rate target of the step before; none
-    in the step of a reset."""
-    limited = clip(state[Z_D] - z, state[POSITION_ERROR_MIN], state[POSITION_ERROR_MAX])
-    target: float = square_root(limited, p[POSITION_P], p[ACCELERATION], 0.0) + state[V_D]
-    return (target - state[V_T]) / p[DT] if state[RESET] == 0.0 else 0.0
-
-
-@kernel
 def step(
     state: State,
     body: Samples,
@@ -324,7 +315,9 @@ def step(
     used: it is a parameter of the loop. `disturbance` has shape (3,) as `DISTURBANCES`."""
     state[Z_D], state[V_D], state[A_D] = reference[0], reference[1], reference[2]
     if p[DIFFERENTIATES] > 0.0:
-        state[A_D] = change_of_target(state, p, body[ALTITUDE])
+        before = state[V_T]
+        _control_position(state, p, body[ALTITUDE])
+        state[A_D] = (state[V_T] - before) / p[DT] if state[RESET] == 0.0 else 0.0
     filtered = state[THROTTLE_FILTERED]
     filtered += p[THROTTLE_GAIN] * (state[THROTTLE] - filtered)
     sensed = body[SENSED] + disturbance[2]
