@@ -228,11 +228,12 @@ class Recording:
 
 def date_of(utc_s: float) -> datetime | None:
     """The date, UTC, of a time since 1970; None if no clock was set, or it is ahead."""
-    is_set = _CLOCKS_SET.timestamp() <= utc_s <= (datetime.now(UTC) + timedelta(days=1)).timestamp()
+    is_set = CLOCK_SET_S <= utc_s <= (datetime.now(UTC) + timedelta(days=1)).timestamp()
     return datetime.fromtimestamp(utc_s, UTC) if is_set else None
 
 
-_CLOCKS_SET: Final = datetime(2001, 1, 1, tzinfo=UTC)
+CLOCK_SET_S: Final = datetime(2001, 1, 1, tzinfo=UTC).timestamp()
+"""A recorder whose clock is before this has none."""
 
 
 def release_of(packed: int) -> str:

@@ -11,7 +11,6 @@ from array import array
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
@@ -19,6 +18,7 @@ import numpy as np
 
 from app.autopilots.autopilot import GainParameter
 from app.autopilots.recording import (
+    CLOCK_SET_S,
     LONGEST_INTERVAL_S,
     Event,
     EventKind,
@@ -69,8 +69,6 @@ _SHORTEST_BOOT_S: Final = 1.0
 _LONGEST_OFF_S: Final = 86_400.0
 """If the ground's time jumps by more than this, its clock was set."""
 _APART_S: Final = 2.0
-_SET_S: Final = datetime(2001, 1, 1, tzinfo=UTC).timestamp()
-"""A ground station whose clock is before this has none."""
 _ARMED: Final = 128
 _ACCEPTED: Final = (0, 5)
 _MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
@@ -128,7 +126,7 @@ class _Clock:
             self.restarts.append(Event(EventKind.BOOT, time_s, "the vehicle restarting"))
         self.now_s, self.last_heard_s = max(self.now_s, time_s), stamp_s
         self.first_heard_s = min(self.first_heard_s, stamp_s)
-        if stamp_s >= _SET_S and self.zero_s > stamp_s:
+        if stamp_s >= CLOCK_SET_S and self.zero_s > stamp_s:
             self.zero_s = stamp_s - time_s
         return time_s
 
