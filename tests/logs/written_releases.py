@@ -157,6 +157,13 @@ def _packed(letter: str, value: float | str) -> float | bytes:
 
 _SINCE_4_1: Final = {"PSC_VELZ_I": 0.0, "PSC_JERK_Z": 5.0, "FRAME_CLASS": 1.0, "LOG_BITMASK": 176126.0}
 _UNTIL_4_0: Final = {"LOG_BITMASK": 176126.0}
+_MESSAGES_SINCE_4_6: Final = {
+    **TIMED,
+    "CTUN": ("Qffffffeccfhh", CTUN),
+    "RATE": RATE,
+    "PSCD": ("Qfffffffff", PSCD.replace("TPD", "DPD,TPD")),
+    "ATT": ("Qffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch"),
+}
 _CENTI: Final = {"CTUN": "F-----0BBB0BB", "RATE": "F---------BB0"}
 
 RELEASES: Final[Mapping[str, Release]] = {
@@ -220,25 +227,13 @@ RELEASES: Final[Mapping[str, Release]] = {
     ),
     "4.6": Release(
         banner="ArduCopter V4.6.0 (0a1b2c3d)",
-        messages={
-            **TIMED,
-            "CTUN": ("Qffffffeccfhh", CTUN),
-            "RATE": RATE,
-            "PSCD": ("Qfffffffff", PSCD.replace("TPD", "DPD,TPD")),
-            "ATT": ("Qffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch"),
-        },
+        messages=_MESSAGES_SINCE_4_6,
         parameters=_SINCE_4_1,
         scales=_CENTI,
     ),
     "4.7": Release(
         banner="ArduCopter V4.7.0 (0a1b2c3d)",
-        messages={
-            **TIMED,
-            "CTUN": ("Qffffffeccfhh", CTUN),
-            "RATE": RATE,
-            "PSCD": ("Qfffffffff", PSCD.replace("TPD", "DPD,TPD")),
-            "ATT": ("Qffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch"),
-        },
+        messages=_MESSAGES_SINCE_4_6,
         names=NAMES_4_7,
         parameters=_SINCE_4_1,
         scales=_CENTI,
