@@ -96,15 +96,17 @@ def lines_of_job(data_dir: Path, job_id: int, *, since: datetime, limit: int) ->
     found: list[LogLine] = []
     for suffix in (*(f".{number}" for number in range(KEPT_LOGS, 0, -1)), ""):
         file = data_dir / "log" / f"worker.log{suffix}"
-        found.extend(line for line in _of_file(file, job_id) if line.at >= since)
+        found.extend(line for line in _of_file(file, job_id, since) if line.at >= since)
     return found[-limit:], len(found)
 
 
-def _of_file(file: Path, job_id: int) -> Iterator[LogLine]:
+def _of_file(file: Path, job_id: int, since: datetime) -> Iterator[LogLine]:
     """Lines of one file about the job; most lines are about others and are skipped by their text, without being
     parsed."""
     mark = f'"job_id": {job_id}'
     try:
+        if file.stat().st_mtime < since.timestamp():
+            return
         with file.open(encoding="utf-8", errors="replace") as opened:
             for text in opened:
                 if mark in text and (line := _parsed(text, job_id)) is not None:
