@@ -27,7 +27,7 @@ from app.fleet.router import router as fleet
 from app.flights.router import router as flights
 from app.jobs.router import router as jobs
 from app.live.hub import live_link
-from app.log_analyses.router import router as log_analyses
+from app.log_library.router import router as log_analyses
 from app.reports.router import router as reports
 from app.reproductions.router import router as reproductions
 from app.web import errors, events, system

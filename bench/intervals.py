@@ -26,7 +26,7 @@ from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
-from app.log_analyses.takeoffs import logged_takeoffs
+from app.log_library.takeoffs import logged_takeoffs
 from app.logs.base import HEAD_BYTES
 from bench.copters import made_logs
 from bench.copters.made_logs import MadeLog

@@ -124,8 +124,8 @@ def answer_of(log: Log) -> dict[str, Any]:
     # The process that starts the others imports none of these, so that it stays small.
     from app.autopilots.log_readers import reader_of  # noqa: PLC0415
     from app.core.errors import InputError  # noqa: PLC0415
-    from app.log_analyses.content import analyze_content  # noqa: PLC0415
-    from app.log_analyses.schemas import ReplicaAnswer  # noqa: PLC0415
+    from app.log_library.content import analyze_content  # noqa: PLC0415
+    from app.log_library.schemas import ReplicaAnswer  # noqa: PLC0415
     from app.logs.base import HEAD_BYTES  # noqa: PLC0415
     from app.logs.formats import recognise  # noqa: PLC0415
 

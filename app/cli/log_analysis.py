@@ -9,8 +9,8 @@ from rich.markup import escape
 from app.cli.console import console, reading, table, write_json, writing
 from app.common.errors import InputError, Problem
 from app.core.analysis.analysis import Grade
-from app.log_analyses.content import ANALYSED, analyze_content
-from app.log_analyses.schemas import PartTexts, Refusal
+from app.log_library.content import ANALYSED, analyze_content
+from app.log_library.schemas import PartTexts, Refusal
 from app.logs.formats import companion_of
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from bench import logs
 from bench.logs import Log, Row, judge, lines_of, logs_below, main, summary
-from tests.log_analyses.fleet import HOVERS
+from tests.log_library.fleet import HOVERS
 
 ANSWER = {"grade": "partial", "codes": ["too_short"], "compared": True, "compiled": False}
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
-from tests.log_analyses.documents import require_data
+from tests.log_library.documents import require_data
 from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log

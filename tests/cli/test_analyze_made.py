@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from app.cli.commands import app
 from tests.core.analysis.flights import QUIET, simulated_flight
 from tests.core.analysis.px4_flights import simulated_px4
-from tests.log_analyses.documents import require_data
+from tests.log_library.documents import require_data
 from tests.logs.recorded import OnBoardLog
 from tests.logs.written import PARAMETERS, STABILIZE, ardupilot_log
 from tests.logs.written_px4 import TAKEOFF, px4_log

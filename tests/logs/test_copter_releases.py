@@ -19,8 +19,8 @@ from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import InputError
-from app.log_analyses.content import analyze_content
-from app.log_analyses.schemas import LogAnswer, ManoeuvreNumbers
+from app.log_library.content import analyze_content
+from app.log_library.schemas import LogAnswer, ManoeuvreNumbers
 from tests.logs.copter_motions import OLDER, TRUTH, Motion, flown, older_steps
 from tests.logs.written_releases import CTUN, RELEASES, Release
 

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from app.autopilots.log_readers import read_takeoff, read_takeoffs
 from app.core.errors import TrajectoryError
-from app.log_analyses.content import analyze_content
+from app.log_library.content import analyze_content
 from app.logs.base import HEAD_BYTES
 from app.logs.dataflash import DataflashTables, read_tables
 from app.logs.formats import Format, recognise

@@ -29,8 +29,8 @@ from app.core.analysis.segment import Segment
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import InputError, TrajectoryError
 from app.core.models.copter import GRAVITY_M_S2
-from app.log_analyses.content import analyze_content, read_start
-from app.log_analyses.schemas import LogAnswer, ManoeuvreNumbers, UsualNumbers
+from app.log_library.content import analyze_content, read_start
+from app.log_library.schemas import LogAnswer, ManoeuvreNumbers, UsualNumbers
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded
 from tests.logs.written_older_px4 import (

@@ -14,7 +14,7 @@ from app.autopilots.recording import Recording, release_of
 from app.autopilots.tlog import read_tlog
 from app.core.analysis.analysis import Grade
 from app.core.analysis.description import Description, describe
-from app.log_analyses.content import analyze_content
+from app.log_library.content import analyze_content
 from app.logs.formats import Format
 from tests.logs.recorded import BEGAN_US
 from tests.logs.written_tlog import (

@@ -20,7 +20,7 @@ from app.autopilots.tlog import read_tlog
 from app.core.analysis.loop import LoggedFlight
 from app.core.errors import TrajectoryError
 from app.core.reasons import OTHER_FRAMES
-from app.log_analyses.content import analyze_content
+from app.log_library.content import analyze_content
 from app.logs.base import HEAD_BYTES
 from app.logs.formats import Format, recognise
 from tests.logs.recorded import BEGAN_US, Telemetry, recorded

@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.log_analyses.content import analyze_content
-from app.log_analyses.schemas import ReplicaAnswer
+from app.log_library.content import analyze_content
+from app.log_library.schemas import ReplicaAnswer
 
 STEPS = [(0.1 * step, 3.0, 0.2 * step, min(0.5 + 0.2 * (3.0 - 0.2 * step), 1.0)) for step in range(20)]
 

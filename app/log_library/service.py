@@ -23,8 +23,8 @@ from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
-from app.log_analyses.schemas import LogAnalysis
-from app.log_analyses.takeoffs import logged_takeoffs
+from app.log_library.schemas import LogAnalysis
+from app.log_library.takeoffs import logged_takeoffs
 from app.processes.calls import FILE, run_limited
 from app.reproductions.controller import RECORDED_TAKEOFF
 
@@ -41,7 +41,7 @@ def analyze_upload(
 
     Raises InputError that names what is missing or wrong.
     """
-    from app.log_analyses.content import analyze_content  # noqa: PLC0415 - imports every reader and model
+    from app.log_library.content import analyze_content  # noqa: PLC0415 - imports every reader and model
 
     answer, plots = run_limited(FILE, analyze_content, content, companion, name, gains, vehicle)
     figures = {
@@ -63,7 +63,7 @@ def read_upload(
 ) -> Sequence[Takeoff] | Definition:
     """Read what a campaign starts with from an uploaded log, in a process with limits; of one of several vehicles that
     with the system id `vehicle`. Raises InputError that names what is missing or wrong."""
-    from app.log_analyses.content import read_start  # noqa: PLC0415 - imports every reader and model
+    from app.log_library.content import read_start  # noqa: PLC0415 - imports every reader and model
 
     return run_limited(FILE, read_start, content, companion, name, vehicle)
 

@@ -13,8 +13,8 @@ from app.figures.theme import PALETTES
 from tests.builders import Json, get, problems_of, run_jobs
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.fleet.vehicles import register
-from tests.log_analyses.documents import require_data
-from tests.log_analyses.fleet import FLEET
+from tests.log_library.documents import require_data
+from tests.log_library.fleet import FLEET
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import Telemetry, recorded
 from tests.logs.written_px4 import px4_log

@@ -24,8 +24,8 @@ from app.core.formatting import capitalised
 from app.core.reasons import UNNAMED_FRAME, ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
-from app.log_analyses import descriptions, manoeuvres, replicas, takeoffs
-from app.log_analyses.schemas import LogAnswer, Part, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
+from app.log_library import descriptions, manoeuvres, replicas, takeoffs
+from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
 from app.logs.base import HEAD_BYTES
 from app.logs.formats import NEVER_WRITTEN, Format, recognise
 

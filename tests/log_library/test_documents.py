@@ -5,11 +5,11 @@ import json
 from jsonschema import Draft202012Validator
 
 from app.core.reasons import ReasonCode
-from tests.log_analyses.documents import DOCUMENTED, generated
+from tests.log_library.documents import DOCUMENTED, generated
 
 
 def test_the_documented_schema_is_that_of_the_program() -> None:
-    """Write it again with `python -m tests.log_analyses.test_documents`."""
+    """Write it again with `python -m tests.log_library.test_documents`."""
     assert json.loads(DOCUMENTED.read_text()) == generated()
     Draft202012Validator.check_schema(generated())
 

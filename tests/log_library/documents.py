@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from jsonschema import Draft202012Validator
 
-from app.log_analyses.schemas import LogAnswer
+from app.log_library.schemas import LogAnswer
 
 DOCUMENTED: Final = Path(__file__).parents[2] / "docs" / "log-answer.schema.json"
 _MAY_HAVE_BLANKS: Final = frozenset({"file_name", "name", "title"})

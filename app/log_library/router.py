@@ -6,8 +6,8 @@ from fastapi import APIRouter, Query, status
 
 from app.campaigns.schemas import Campaign
 from app.common.schemas import uploaded_name
-from app.log_analyses import service
-from app.log_analyses.schemas import LogAnalysis
+from app.log_library import service
+from app.log_library.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
 FlownGains = Annotated[str, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")]

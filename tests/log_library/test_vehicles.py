@@ -6,9 +6,9 @@ import pytest
 
 from app.core.analysis.analysis import Grade
 from app.core.errors import InputError
-from app.log_analyses.content import analyze_content, read_start
-from tests.log_analyses.documents import require_data
-from tests.log_analyses.fleet import CLIMBS, FLEET, HOVERS
+from app.log_library.content import analyze_content, read_start
+from tests.log_library.documents import require_data
+from tests.log_library.fleet import CLIMBS, FLEET, HOVERS
 from tests.logs.written_tlog import Recording, together
 
 BOTH = {1: "ArduCopter", 7: "ArduCopter"}

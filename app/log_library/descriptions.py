@@ -11,8 +11,8 @@ from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN
 from app.core.errors import InputError, Problem
 from app.core.formatting import percent
 from app.core.reasons import ReasonCode
-from app.log_analyses.manoeuvres import margin_text
-from app.log_analyses.schemas import (
+from app.log_library.manoeuvres import margin_text
+from app.log_library.schemas import (
     Facts,
     PartTexts,
     ReasonField,

@@ -16,7 +16,7 @@ from app.core.experiments.copter_steps import CopterSteps, vector_of
 from app.core.formatting import format_gains, percent
 from app.core.records.trajectory import Samples
 from app.figures.panels import Line, Panel, Plot
-from app.log_analyses.schemas import (
+from app.log_library.schemas import (
     EstimatedValue,
     EstimatedVehicle,
     Facts,

@@ -11,7 +11,7 @@ from app.autopilots.replica_check import Kind, LoopReplica, ReplicaCheck, Signal
 from app.core.formatting import NOTHING, format_gains
 from app.core.records.trajectory import Overlay, Samples, select_samples
 from app.figures.panels import Line, Panel, Plot, Style
-from app.log_analyses.schemas import Facts, PartTexts, ReplicaAnswer, TextTable
+from app.log_library.schemas import Facts, PartTexts, ReplicaAnswer, TextTable
 
 _KINDS: Final[Mapping[Kind, str]] = MappingProxyType({"log": "flight log", "trace": "step-by-step trace"})
 _CURVE_POINTS: Final = 1000

@@ -14,7 +14,7 @@ from app.core.records.trajectory import Trajectory
 from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
 from app.figures.data import Curve, thinned
 from app.figures.panels import Line, Panel, Plot, Style
-from app.log_analyses.schemas import (
+from app.log_library.schemas import (
     Facts,
     GainsInTakeoff,
     ParameterFile,

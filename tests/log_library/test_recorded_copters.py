@@ -13,7 +13,7 @@ from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
-from app.log_analyses.content import analyze_content
+from app.log_library.content import analyze_content
 from app.logs.base import HEAD_BYTES
 from tests.core.tuning.flying import compiled_only
 from tests.logs.recorded import recorded

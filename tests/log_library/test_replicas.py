@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 
 from app.core.control.vertical_guidance import OUTPUTS
 from tests.builders import Json, get, problems_of
-from tests.log_analyses.documents import require_data
+from tests.log_library.documents import require_data
 from tests.logs import recorded as logs
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 
