@@ -27,7 +27,7 @@ from app.fleet.router import router as fleet
 from app.flights.router import router as flights
 from app.jobs.router import router as jobs
 from app.live.hub import live_link
-from app.log_library.router import router as log_analyses
+from app.log_library import router as log_library
 from app.reports.router import router as reports
 from app.reproductions.router import router as reproductions
 from app.web import errors, events, system
@@ -78,7 +78,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         fleet,
         jobs,
         reproductions,
-        log_analyses,
+        log_library.router,
+        log_library.vehicles,
         compare,
         reports,
         bundles,

@@ -134,7 +134,7 @@ def answer_of(log: Log) -> dict[str, Any]:
     except (OSError, EOFError, zlib.error):
         return {"grade": "refused", "codes": [UNREADABLE]}
     try:
-        answer, _ = analyze_content(content, companion, log.file.name.removesuffix(".gz"))
+        answer = analyze_content(content, companion, log.file.name.removesuffix(".gz")).answer
     except InputError as error:
         head = content[:HEAD_BYTES]
         kind = "unusable" if reader_of(head) else getattr(recognise(head), "name", NOT_A_LOG).lower()

@@ -23,7 +23,7 @@ def analyze_log(file: Path, *, gains: str, vehicle: int | None, json_out: Path |
     with reading(file, ANALYSED):
         beside = companion_of(file)
         content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
-    answer, _ = analyze_content(content, companion, file.name, gains, vehicle)
+    answer = analyze_content(content, companion, file.name, gains, vehicle).answer
     out = console(json_out)
     about = [each for each in (answer.autopilot, answer.release, answer.frame) if each]
     out.print(f"[bold]{escape(answer.file_name)}[/] ({escape(', '.join(about))})")

@@ -58,6 +58,7 @@ class Settings(BaseSettings):
     port: int = Field(default=8000, ge=0, le=65535, description="port of the dashboard; 0 selects a free one")
     ui_dir: Path = Field(default_factory=default_ui_dir, description="folder of the built dashboard")
     max_upload_bytes: int = Field(default=48 * 2**20, ge=2**16, description="largest flight record accepted")
+    log_file_bytes: int = Field(default=2**30, ge=0, description="what all stored files of logs may take")
     lease_s: float = Field(
         default=30.0, gt=0, description="silence of a worker after which its job is given to another"
     )

@@ -356,6 +356,57 @@ class JobRow(Base, Reported, _Dated):
     campaign: Mapped[CampaignRow | None] = relationship()
 
 
+class LoggedVehicleRow(Base, Numbered, _Dated):
+    """A vehicle whose logs are kept, known by its hardware id, or where its logs have none, by name."""
+
+    __tablename__ = "logged_vehicle"
+
+    name: Mapped[str] = mapped_column(unique=True)
+    hardware_id: Mapped[str | None] = mapped_column(unique=True)
+
+
+class AnalysedLogRow(Base, Numbered):
+    """The answer to a log, by the `program` of this version; kept for a vehicle, or for a few days.
+
+    `digest` is that of the file and of what it was analysed with, `file_digest` of the file alone. `ordered_at` is when
+    it was flown, or if nobody knows when it was analysed. `numbers` are those for lists and trends, `fit` what the log
+    tells of the vehicle; `answer` is the rest, and `flight` what of it was analysed, packed.
+    """
+
+    __tablename__ = "analysed_log"
+    __table_args__ = (Index("ix_analysed_log_vehicle_id_ordered_at", "vehicle_id", "ordered_at"), NEVER_REUSE_IDS)
+
+    vehicle_id: Mapped[int | None] = mapped_column(ForeignKey("logged_vehicle.id"))
+    digest: Mapped[str] = mapped_column(unique=True)
+    file_digest: Mapped[str]
+    file_name: Mapped[str]
+    autopilot: Mapped[str]
+    grade: Mapped[str]
+    hardware_id: Mapped[str]
+    vehicle_name: Mapped[str]
+    program: Mapped[str]
+    flown_at: Mapped[datetime | None]
+    analysed_at: Mapped[datetime]
+    ordered_at: Mapped[datetime]
+    numbers: Mapped[JsonObject]
+    fit: Mapped[JsonObject | None]
+    answer: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+    flight: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    file_bytes: Mapped[int] = mapped_column(default=0)
+
+    vehicle: Mapped[LoggedVehicleRow | None] = relationship()
+
+
+class LogFileRow(Base):
+    """The file of a kept log and its companion, where that was asked for."""
+
+    __tablename__ = "log_file"
+
+    log_id: Mapped[int] = mapped_column(ForeignKey("analysed_log.id", ondelete="CASCADE"), primary_key=True)
+    content: Mapped[bytes] = mapped_column(LargeBinary)
+    companion: Mapped[bytes | None] = mapped_column(LargeBinary)
+
+
 class EventRow(Base, Numbered):
     """The outbox: what changed, in order."""
 

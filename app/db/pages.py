@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 
 from app.common.errors import InputError, Problem
 from app.common.schemas import Number, Page
-from app.db.base import Reported, UtcDateTime
+from app.db.base import Numbered, UtcDateTime
 
-R = TypeVar("R", bound=Reported | Row[Any])
+R = TypeVar("R", bound=Numbered | Row[Any])
 V = TypeVar("V")
 
 

@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
-REVISION: Final = "0011"
+REVISION: Final = "0012"
 """Revision of the newest migration."""
 
 

@@ -280,6 +280,13 @@ def list_vehicles(session: Session, part: Part) -> Page[Vehicle]:
     return page_of(session, select(VehicleRow), by_id, part, lambda rows: [vehicle_view(row) for row in rows])
 
 
+def name_of_hardware(session: Session, hardware_id: str) -> str | None:
+    """Name of the registered vehicle with this hardware id, if there is one alone."""
+    rows = repository.registered_in(session, *VehicleState) if hardware_id else []
+    names = [row.name for row in rows if (row.identity or {}).get("uid") == hardware_id]
+    return names[0] if len(names) == 1 else None
+
+
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:
     """The vehicle with that id. Raises NotFoundError."""
     return vehicle_view(repository.get_one(session, vehicle_id))

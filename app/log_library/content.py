@@ -3,6 +3,7 @@
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from operator import attrgetter
 from typing import Final, Generic, TypeVar
 
@@ -25,6 +26,7 @@ from app.core.reasons import UNNAMED_FRAME, ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_library import descriptions, manoeuvres, replicas, takeoffs
+from app.log_library.library_schemas import LogNumbers
 from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
 from app.logs.base import HEAD_BYTES
 from app.logs.formats import NEVER_WRITTEN, Format, recognise
@@ -65,10 +67,25 @@ def read_start(
     return manoeuvres.start_of(analyze(flown), name) if isinstance(flown, LoggedFlight) else flown
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalysedContent:
+    """What an analysis finds: the answer and the figures of its parts; and what the library keeps beside them: numbers
+    for lists, the vehicle's identity, when it flew, its parameters, and the campaign that can start from the log."""
+
+    answer: LogAnswer
+    plots: Mapping[Part, Sequence[Plot]]
+    numbers: LogNumbers
+    hardware_id: str = ""
+    vehicle_name: str = ""
+    flown_at: datetime | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    definition: Definition | None = None
+
+
 def analyze_content(
     content: bytes, companion: bytes | None, name: str, gains: str = "", vehicle: int | None = None
-) -> tuple[LogAnswer, dict[Part, list[Plot]]]:
-    """The answer of a log or trace in memory, and the figures of its parts; takes some seconds.
+) -> AnalysedContent:
+    """Analyse a log or trace in memory; takes some seconds.
 
     `gains` are `KP,KI,KD` as flown, if the log does not contain them; `vehicle` is the system id of the one to analyse,
     by default that with the most to learn. Raises InputError that names what is wrong with a file that cannot be read;
@@ -77,6 +94,7 @@ def analyze_content(
     autopilot, release, frame, system = traced(content[:HEAD_BYTES]), "", "", None
     vehicles: dict[int, str] = {}
     replica: _Answered[ReplicaAnswer] | _Answered[Refusal]
+    recording: Recording | None = None
     if autopilot is None:
         reader, logged = _decoded(content, companion, name)
         recording = reader.vehicle(logged, name, vehicle)
@@ -104,16 +122,25 @@ def analyze_content(
         replica=replica.answer,
         texts=Texts(tuning=tuning.texts, replica=replica.texts),
     )
-    return answer, {"tuning": tuning.plots, "replica": replica.plots}
+    return AnalysedContent(
+        answer=answer,
+        plots={"tuning": tuning.plots, "replica": replica.plots},
+        numbers=tuning.numbers,
+        flown_at=None if recording is None else recording.started_at,
+        definition=tuning.definition,
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Answered(Generic[_Answer]):
-    """A part of the answer: in numbers, for a person, and its figures."""
+    """A part of the answer: in numbers, for a person, and its figures; numbers for lists, and the campaign that can
+    start from it."""
 
     answer: _Answer
     texts: PartTexts
     plots: list[Plot] = field(default_factory=list)
+    numbers: LogNumbers = field(default_factory=LogNumbers)
+    definition: Definition | None = None
 
 
 def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[TuningAnswer]:
@@ -133,6 +160,7 @@ def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[Tuning
     facts = [*found.texts.facts, descriptions.flight_facts(description)]
     return replace(
         found,
+        numbers=found.numbers.completed_by(description),
         answer=found.answer.model_copy(update={"description": description}),
         texts=found.texts.model_copy(update={"facts": facts}),
     )
@@ -141,9 +169,12 @@ def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[Tuning
 def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[TuningAnswer]:
     if isinstance(flown, LoggedFlight):
         flight = analyze(flown)
-        return _Answered(*manoeuvres.answer_of(flight, name, flown.assumed), [manoeuvres.plot_of(flight)])
+        answer, texts = manoeuvres.answer_of(flight, name, flown.assumed)
+        start = manoeuvres.start_of(flight, name) if answer.starts_campaign else None
+        return _Answered(answer, texts, [manoeuvres.plot_of(flight)], manoeuvres.listed_numbers(flight), start)
     takeoff = analyze_takeoffs(takeoffs.logged_takeoffs(flown, name=name))
-    return _Answered(*takeoffs.answer_of(takeoff, name), [takeoffs.plot_of(takeoff)])
+    answer, texts = takeoffs.answer_of(takeoff, name)
+    return _Answered(answer, texts, [takeoffs.plot_of(takeoff)], takeoffs.listed_numbers(takeoff))
 
 
 def _margins(recording: Recording, description: Description | None) -> UsualMargins | None:

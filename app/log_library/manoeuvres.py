@@ -16,6 +16,7 @@ from app.core.experiments.copter_steps import CopterSteps, vector_of
 from app.core.formatting import format_gains, percent
 from app.core.records.trajectory import Samples
 from app.figures.panels import Line, Panel, Plot
+from app.log_library.library_schemas import LogNumbers
 from app.log_library.schemas import (
     EstimatedValue,
     EstimatedVehicle,
@@ -57,6 +58,19 @@ def answer_of(analysis: Analysis, file_name: str, assumed: Sequence[str]) -> tup
         parameter_file=None if content is None else ParameterFile(name=name, content=content),
     )
     return answer, texts
+
+
+def listed_numbers(analysis: Analysis) -> LogNumbers:
+    """Those for lists."""
+    flown, mean, deviation = analysis.assessments[0], analysis.estimate.mean, analysis.estimate.deviation
+    return LogNumbers(
+        hover_throttle=EstimatedValue(mean=mean.hover_throttle, deviation=deviation.hover_throttle),
+        thrust_slope=EstimatedValue(mean=mean.thrust_slope, deviation=deviation.thrust_slope),
+        deviation_m=analysis.behaviour.error_m,
+        activity=flown.prediction.activity,
+        margin=flown.margin,
+        gains=dict(flown.gains),
+    )
 
 
 def plot_of(analysis: Analysis) -> Plot:

@@ -11,8 +11,6 @@ from app.core.analysis.analysis import Behaviour, Grade
 from app.core.analysis.description import Description
 from app.core.analysis.hand_rules import UsualGains
 from app.core.models.copter import Copter
-from app.figures.base import Card
-from app.figures.theme import ThemeName
 
 Unit = Annotated[str, AfterValidator(lambda unit: unit.replace(" ", "_"))]
 """A unit in one word: of_full."""
@@ -247,9 +245,3 @@ class LogAnswer(Schema):
     tuning: TuningAnswer
     replica: ReplicaAnswer | Refusal
     texts: Texts
-
-
-class LogAnalysis(LogAnswer):
-    """The result of a log analysis."""
-
-    figures: Annotated[dict[ThemeName, dict[Part, list[Card]]], Field(description="by theme, of each part")]

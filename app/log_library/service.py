@@ -1,8 +1,9 @@
-"""Operations on logs: analyse one of any autopilot, which stores nothing, and create a campaign from one."""
+"""Operations on log files: analyse one of any autopilot, and create a campaign from one."""
 
+import gzip
 from collections.abc import Sequence
-from pathlib import PurePath
-from typing import Final, get_args
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Final
 
 from sqlalchemy.orm import Session
 
@@ -18,44 +19,60 @@ from app.campaigns.trials.service import evaluate_gate
 from app.common.states import CampaignState
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.tuning.logged_takeoffs import comparable_takeoffs
-from app.figures.base import card_of
-from app.figures.panels import PanelsFigure
-from app.figures.theme import ThemeName
+from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
-from app.log_library.schemas import LogAnalysis
+from app.log_library import stored_logs
+from app.log_library.library_schemas import LogAnalysis
 from app.log_library.takeoffs import logged_takeoffs
 from app.processes.calls import FILE, run_limited
-from app.reproductions.controller import RECORDED_TAKEOFF
 
+if TYPE_CHECKING:
+    from app.log_library.content import AnalysedContent
+
+EXAMPLE: Final = Path(__file__).parent / "data" / "arducopter_steps.bin.gz"
 UNNAMED: Final = "Log"
 _FURTHER_FLIGHTS: Final = 6
 _ANY_RECORD: Final = Accepted(confirm=True, invalid=True)
 
 
 def analyze_upload(
-    content: bytes, companion: bytes | None, *, name: str, gains: str = "", vehicle: int | None = None
+    database: Database,
+    content: bytes,
+    companion: bytes | None,
+    *,
+    name: str,
+    gains: str = "",
+    vehicle: int | None = None,
 ) -> LogAnalysis:
-    """Analyse an uploaded log or trace in a process with limits. `companion` is the .log file of Paparazzi's .data
-    file, `gains` those flown, if no log contains them, `vehicle` the system id of one of several vehicles.
+    """Analyse an uploaded log or trace in a process with limits, and store the answer; if this version has answered it
+    before, that one. `companion` is the .log file of Paparazzi's .data file, `gains` those flown, if no log contains
+    them, `vehicle` the system id of one of several vehicles.
 
     Raises InputError that names what is missing or wrong.
     """
+    digest = stored_logs.digest_of(content, companion, gains=gains, vehicle=vehicle)
+    with database.read() as session:
+        if (known := stored_logs.answered(session, digest)) is not None:
+            return stored_logs.get_analysis(session, known)
+    found = analyze(content, companion, name=name, gains=gains, vehicle=vehicle)
+    with database.write() as session:
+        log_id = stored_logs.store(session, found, digest, stored_logs.digest_of(content, companion))
+        return stored_logs.get_analysis(session, log_id)
+
+
+def analyze(
+    content: bytes, companion: bytes | None, *, name: str, gains: str = "", vehicle: int | None = None
+) -> "AnalysedContent":
+    """Analyse a log as above, and store nothing."""
     from app.log_library.content import analyze_content  # noqa: PLC0415 - imports every reader and model
 
-    answer, plots = run_limited(FILE, analyze_content, content, companion, name, gains, vehicle)
-    figures = {
-        theme: {
-            part: [card_of(PanelsFigure(plot, theme_name=theme)) for plot in drawn] for part, drawn in plots.items()
-        }
-        for theme in get_args(ThemeName)
-    }
-    return LogAnalysis(**dict(answer), figures=figures)
+    return run_limited(FILE, analyze_content, content, companion, name, gains, vehicle)
 
 
-def analyze_example() -> LogAnalysis:
-    """Analyse the takeoff that comes with the program, recorded from the autopilot's own code."""
-    return analyze_upload(RECORDED_TAKEOFF.read_bytes(), None, name=RECORDED_TAKEOFF.name)
+def analyze_example(database: Database) -> LogAnalysis:
+    """Analyse the log that comes with the program."""
+    return analyze_upload(database, gzip.decompress(EXAMPLE.read_bytes()), None, name=EXAMPLE.stem)
 
 
 def read_upload(
@@ -66,6 +83,16 @@ def read_upload(
     from app.log_library.content import read_start  # noqa: PLC0415 - imports every reader and model
 
     return run_limited(FILE, read_start, content, companion, name, vehicle)
+
+
+def start_of(session: Session, log_id: int) -> tuple[Sequence[Takeoff] | Definition, str]:
+    """What a campaign starts with of a stored log, and its name; its takeoffs are in its file alone. Raises
+    NotFoundError; ConflictError if the file is not stored; InputError if no campaign starts from it."""
+    name, definition = stored_logs.definition_of(session, log_id)
+    if definition is not None:
+        return definition, name
+    file = stored_logs.get_file(session, log_id)
+    return read_upload(file.content, file.companion, name=name), name
 
 
 def start_campaign(

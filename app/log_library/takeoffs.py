@@ -14,6 +14,7 @@ from app.core.records.trajectory import Trajectory
 from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
 from app.figures.data import Curve, thinned
 from app.figures.panels import Line, Panel, Plot, Style
+from app.log_library.library_schemas import LogNumbers
 from app.log_library.schemas import (
     Facts,
     GainsInTakeoff,
@@ -63,6 +64,11 @@ def answer_of(analysis: TakeoffAnalysis, file_name: str) -> tuple[TuningAnswer, 
     )
     numbers = _numbers(analysis)
     return TuningAnswer(grade=Grade.FULL, reasons=why, proposes=proposes, starts_campaign=True, numbers=numbers), texts
+
+
+def listed_numbers(analysis: TakeoffAnalysis) -> LogNumbers:
+    """Those for lists, of the best takeoff."""
+    return LogNumbers(deviation_m=analysis.best.error, gains=dict(analysis.best.gains))
 
 
 def plot_of(analysis: TakeoffAnalysis) -> Plot:

@@ -122,6 +122,7 @@ class BodyLimitMiddleware:
             "/records": of_flight,
             "/log-analyses": analysed,
             "/log-analyses/campaign": analysed,
+            "/file": analysed,
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),
             "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` imports larger ones"),
         }

@@ -98,7 +98,7 @@ def test_a_flight_in_wind_gets_a_proposal(flown: RecordedFlight) -> None:
 @pytest.mark.complete
 def test_steps_to_the_side_at_one_altitude_are_described_without_a_proposal() -> None:
     """The only altitude change is the end of the takeoff."""
-    found = analyze_content(recorded("arducopter_lateral_steps.bin"), None, "lateral.bin")[0]
+    found = analyze_content(recorded("arducopter_lateral_steps.bin"), None, "lateral.bin").answer
     answer, texts = found.tuning, found.texts.tuning
     assert (answer.grade, answer.proposes) == ("partial", False)
     assert [each.code for each in answer.reasons] == ["no_whole_change"]

@@ -9,7 +9,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.core.control.vertical_guidance import OUTPUTS
-from tests.builders import Json, get, problems_of
+from app.reproductions.controller import RECORDED_TAKEOFF
+from tests.builders import Json, problems_of
 from tests.log_library.documents import require_data
 from tests.logs import recorded as logs
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
@@ -279,7 +280,7 @@ def test_a_small_file_that_unpacks_to_a_huge_one_is_refused(client: TestClient) 
     assert (answer.status_code, problems_of(answer)) == (422, {"file": "contains more than 256 MiB of text"})
 
 
-def test_the_example_shows_what_the_replica_is(client: TestClient) -> None:
-    found = get(client, f"{PATH}/example")
+def test_the_recorded_takeoff_is_exact_in_every_step(client: TestClient) -> None:
+    found = client.post(PATH, files={"file": (RECORDED_TAKEOFF.name, RECORDED_TAKEOFF.read_bytes())}).json()
     assert found["file_name"] == "takeoff_default.csv.gz"
     assert "all 8\N{NARROW NO-BREAK SPACE}192 steps are exact in all 7 signals" in found["texts"]["replica"]["answer"]

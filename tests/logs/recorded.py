@@ -6,6 +6,8 @@ import struct
 from pathlib import Path
 from typing import Any
 
+from app.log_library.service import EXAMPLE
+
 LOGS = Path(__file__).parent.parent / "data" / "logs"
 TAKEOFFS = LOGS.parent / "takeoffs"
 
@@ -20,8 +22,10 @@ BEGAN_US = 1_795_222_159_000_000
 
 def recorded(name: str) -> bytes:
     """The content of a recorded log, uncompressed."""
-    path = LOGS / name
-    return path.read_bytes() if path.exists() else gzip.decompress((LOGS / f"{name}.gz").read_bytes())
+    if (path := LOGS / name).exists():
+        return path.read_bytes()
+    packed = next(folder / f"{name}.gz" for folder in (LOGS, EXAMPLE.parent) if (folder / f"{name}.gz").exists())
+    return gzip.decompress(packed.read_bytes())
 
 
 SIZES = {

@@ -59,7 +59,7 @@ def refusal(content: bytes) -> list[tuple[str, str]]:
 
 
 def answered(content: bytes) -> LogAnswer:
-    return analyze_content(content, None, "flight.bin")[0]
+    return analyze_content(content, None, "flight.bin").answer
 
 
 KINDS = ("steps", "takeoff", "plain")

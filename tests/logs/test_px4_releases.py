@@ -60,7 +60,7 @@ def flown(written: Written) -> LoggedFlight:
 
 
 def answered(written: Written) -> LogAnswer:
-    return analyze_content(written.content, None, "flight.ulg")[0]
+    return analyze_content(written.content, None, "flight.ulg").answer
 
 
 def refused(written: Written) -> tuple[str, str, list[str]]:

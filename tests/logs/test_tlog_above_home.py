@@ -74,7 +74,7 @@ def test_a_flight_that_is_in_the_air_throughout_has_its_hover_at_its_lowest_too(
 
 
 def test_the_answer_names_what_more_it_would_need_and_the_margins_of_the_gains_flown() -> None:
-    answer, _ = analyze_content(TAKEOFF.content, None, "flight.tlog")
+    answer = analyze_content(TAKEOFF.content, None, "flight.tlog").answer
     assert (answer.tuning.grade, answer.frame) == (Grade.PARTIAL, "quadrotor")
     missing = {each.field: each.code for each in answer.tuning.reasons if each.code != "message_rare"}
     assert missing == {
@@ -199,7 +199,7 @@ def test_the_release_is_that_of_the_firmware(told: Mapping[str, Any], release: s
     for version in told.values():
         log.vehicle("autopilot_version", 0, version, 0, 0, 0, bytes(8), bytes(8), bytes(8), 0, 0, 0)
     assert recording_of(log.content).release == release
-    answer, _ = analyze_content(log.content, None, "flight.tlog")
+    answer = analyze_content(log.content, None, "flight.tlog").answer
     assert answer.release == (release or None)
 
 

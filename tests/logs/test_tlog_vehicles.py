@@ -224,9 +224,9 @@ def test_the_vehicle_with_the_most_to_learn_is_analysed_whichever_reports_most(f
 
 @pytest.mark.complete
 def test_the_analysis_says_that_there_was_another_and_takes_it_on_request(fleet: bytes) -> None:
-    answer, _ = analyze_content(fleet, None, "flight.tlog")
+    answer = analyze_content(fleet, None, "flight.tlog").answer
     assert answer.texts.tuning.notes.count("Another vehicle in the log, system 9 under ArduPilot.") == 1
-    other, _ = analyze_content(fleet, None, "flight.tlog", vehicle=9)
+    other = analyze_content(fleet, None, "flight.tlog", vehicle=9).answer
     assert "other_modes" in [each.code for each in other.tuning.reasons]
     said = " ".join((*other.texts.tuning.reasons, *other.texts.tuning.notes))
     assert said.casefold().count("another vehicle in the log, system 1 under ardupilot") == 1

@@ -2,7 +2,7 @@
 
 import { useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
-import { analyzeLog, getExampleAnalysis, startCampaign } from "./generated";
+import { analyzeExample, analyzeLog, startCampaign } from "./generated";
 import type { RecordFiles } from "./records";
 
 export type { Description, LogAnalysis, PartTexts, TuningAnswer } from "./generated";
@@ -36,6 +36,6 @@ export interface AnalysedLog {
 export function useAnalyzeLog() {
   return useMutation({
     mutationFn: ({ files, gains = "", vehicle = null }: AnalysedLog) =>
-      answer(files === null ? getExampleAnalysis() : analyzeLog({ body: { ...files }, query: { gains, vehicle } })),
+      answer(files === null ? analyzeExample() : analyzeLog({ body: { ...files }, query: { gains, vehicle } })),
   });
 }

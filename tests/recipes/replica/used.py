@@ -19,8 +19,9 @@ DIFFERS = "The replica differs: 1 of 20 steps is not within the tolerances, the 
 
 @pytest.mark.parametrize(("at_10", "sentence"), [(STEPS[10], AGREES), ((*STEPS[10][:3], 0.9), DIFFERS)])
 def test_the_trace_is_compared_step_by_step(at_10: tuple[float, ...], sentence: str) -> None:
-    answer, plots = analyze_content(trace(*STEPS[:10], at_10, *STEPS[11:]), None, "run.csv")
+    found = analyze_content(trace(*STEPS[:10], at_10, *STEPS[11:]), None, "run.csv")
+    answer = found.answer
     assert answer.autopilot == "Toy"
     assert isinstance(answer.replica, ReplicaAnswer)
     assert answer.texts.replica.answer == sentence
-    assert [plot.title for plot in plots["replica"]] == ["Throttle"]
+    assert [plot.title for plot in found.plots["replica"]] == ["Throttle"]

@@ -2,7 +2,7 @@
 
 import { type Client, type ClientMeta, formDataBodySerializer, type Options as Options2, type RequestResult, type ServerSentEventsResult, type TDataShape } from './client';
 import { client } from './client.gen';
-import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, AddPhotoData, AddPhotoErrors, AddPhotoResponses, AnalyzeLogData, AnalyzeLogErrors, AnalyzeLogResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, BringInBundleData, BringInBundleErrors, BringInBundleResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, CompareFlightsData, CompareFlightsErrors, CompareFlightsResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DeletePhotoData, DeletePhotoErrors, DeletePhotoResponses, DeleteVehicleData, DeleteVehicleErrors, DeleteVehicleResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EvaluateGateData, EvaluateGateErrors, EvaluateGateResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetAccessData, GetAccessErrors, GetAccessResponses, GetAddressCodeData, GetAddressCodeErrors, GetAddressCodeResponses, GetBackupData, GetBackupErrors, GetBackupResponses, GetBundleData, GetBundleErrors, GetBundleResponses, GetCalibrationData, GetCalibrationErrors, GetCalibrationResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetComparisonCsvData, GetComparisonCsvErrors, GetComparisonCsvResponses, GetComparisonFigureData, GetComparisonFigureErrors, GetComparisonFigureResponses, GetExampleAnalysisData, GetExampleAnalysisErrors, GetExampleAnalysisResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobLogData, GetJobLogErrors, GetJobLogResponses, GetJobResponses, GetLandscapeData, GetLandscapeErrors, GetLandscapeResponses, GetPhotoData, GetPhotoErrors, GetPhotoResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReadinessData, GetReadinessErrors, GetReadinessResponses, GetReportAsPdfData, GetReportAsPdfErrors, GetReportAsPdfResponses, GetReportData, GetReportErrors, GetReportResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetSystemData, GetSystemErrors, GetSystemResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleFigureData, GetVehicleFigureErrors, GetVehicleFigureResponses, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, ImportFlightData, ImportFlightErrors, ImportFlightResponses, JudgeAbortData, JudgeAbortErrors, JudgeAbortResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListPhotosData, ListPhotosErrors, ListPhotosResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, PredictGainsData, PredictGainsErrors, PredictGainsResponses, PromoteBestData, PromoteBestErrors, PromoteBestResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, RehearseCampaignData, RehearseCampaignErrors, RehearseCampaignResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, ReopenCampaignData, ReopenCampaignErrors, ReopenCampaignResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StartCampaignData, StartCampaignErrors, StartCampaignResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
+import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, AddPhotoData, AddPhotoErrors, AddPhotoResponses, AnalyzeExampleData, AnalyzeExampleErrors, AnalyzeExampleResponses, AnalyzeLogData, AnalyzeLogErrors, AnalyzeLogResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, BringInBundleData, BringInBundleErrors, BringInBundleResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, CompareFlightsData, CompareFlightsErrors, CompareFlightsResponses, CompareLogsData, CompareLogsErrors, CompareLogsResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DeleteLogData, DeleteLogErrors, DeleteLogResponses, DeletePhotoData, DeletePhotoErrors, DeletePhotoResponses, DeleteVehicleData, DeleteVehicleErrors, DeleteVehicleResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EvaluateGateData, EvaluateGateErrors, EvaluateGateResponses, EventsData, EventsErrors, EventsResponses, ExportLogData, ExportLogErrors, ExportLogResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetAccessData, GetAccessErrors, GetAccessResponses, GetAddressCodeData, GetAddressCodeErrors, GetAddressCodeResponses, GetBackupData, GetBackupErrors, GetBackupResponses, GetBundleData, GetBundleErrors, GetBundleResponses, GetCalibrationData, GetCalibrationErrors, GetCalibrationResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetComparisonCsvData, GetComparisonCsvErrors, GetComparisonCsvResponses, GetComparisonFigureData, GetComparisonFigureErrors, GetComparisonFigureResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobLogData, GetJobLogErrors, GetJobLogResponses, GetJobResponses, GetLandscapeData, GetLandscapeErrors, GetLandscapeResponses, GetLogAnalysisData, GetLogAnalysisErrors, GetLogAnalysisResponses, GetLogFileData, GetLogFileErrors, GetLogFileResponses, GetLoggedVehicleData, GetLoggedVehicleErrors, GetLoggedVehicleResponses, GetPhotoData, GetPhotoErrors, GetPhotoResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReadinessData, GetReadinessErrors, GetReadinessResponses, GetReportAsPdfData, GetReportAsPdfErrors, GetReportAsPdfResponses, GetReportData, GetReportErrors, GetReportResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetSystemData, GetSystemErrors, GetSystemResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrendData, GetTrendErrors, GetTrendResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleFigureData, GetVehicleFigureErrors, GetVehicleFigureResponses, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, ImportFlightData, ImportFlightErrors, ImportFlightResponses, JudgeAbortData, JudgeAbortErrors, JudgeAbortResponses, KeepLogData, KeepLogErrors, KeepLogResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListLoggedVehiclesData, ListLoggedVehiclesErrors, ListLoggedVehiclesResponses, ListLogsData, ListLogsErrors, ListLogsResponses, ListPhotosData, ListPhotosErrors, ListPhotosResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, PredictGainsData, PredictGainsErrors, PredictGainsResponses, PromoteBestData, PromoteBestErrors, PromoteBestResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, RehearseCampaignData, RehearseCampaignErrors, RehearseCampaignResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RenameLoggedVehicleData, RenameLoggedVehicleErrors, RenameLoggedVehicleResponses, ReopenCampaignData, ReopenCampaignErrors, ReopenCampaignResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StartCampaignData, StartCampaignErrors, StartCampaignResponses, StartStoredCampaignData, StartStoredCampaignErrors, StartStoredCampaignResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, StoreLogFileData, StoreLogFileErrors, StoreLogFileResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
 
 export type Options<TData extends TDataShape = TDataShape, ThrowOnError extends boolean = boolean, TResponse = unknown> = Options2<TData, ThrowOnError, TResponse> & {
     /**
@@ -690,6 +690,13 @@ export const runReproduction = <ThrowOnError extends boolean = false>(options: O
 export const getReproductionFigure = <ThrowOnError extends boolean = false>(options: Options<GetReproductionFigureData, ThrowOnError>): RequestResult<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError> => (options.client ?? client).get<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError>({ url: '/api/reproductions/{name}/figures/{figure}', ...options });
 
 /**
+ * List Logs
+ *
+ * Analysed logs, the newest flight first.
+ */
+export const listLogs = <ThrowOnError extends boolean = false>(options?: Options<ListLogsData, ThrowOnError>): RequestResult<ListLogsResponses, ListLogsErrors, ThrowOnError> => (options?.client ?? client).get<ListLogsResponses, ListLogsErrors, ThrowOnError>({ url: '/api/log-analyses', ...options });
+
+/**
  * Analyze Log
  *
  * Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains; and how well the replica of
@@ -697,7 +704,8 @@ export const getReproductionFigure = <ThrowOnError extends boolean = false>(opti
  *
  * ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, a .tlog of altitude steps under either, or
  * Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m; or a trace of the
- * vertical loop with a row for every step, .csv or .csv.gz. Takes some seconds; nothing is stored.
+ * vertical loop with a row for every step, .csv or .csv.gz. Takes some seconds. The answer is stored for seven days,
+ * or until it is deleted if the log is kept; the file is not. The same log again has the same answer.
  */
 export const analyzeLog = <ThrowOnError extends boolean = false>(options: Options<AnalyzeLogData, ThrowOnError>): RequestResult<AnalyzeLogResponses, AnalyzeLogErrors, ThrowOnError> => (options.client ?? client).post<AnalyzeLogResponses, AnalyzeLogErrors, ThrowOnError>({
     ...formDataBodySerializer,
@@ -710,11 +718,11 @@ export const analyzeLog = <ThrowOnError extends boolean = false>(options: Option
 });
 
 /**
- * Get Example Analysis
+ * Analyze Example
  *
- * Analyse the example: a takeoff that comes with Gainline, recorded from the autopilot's own code.
+ * Analyse the log that comes with Gainline: altitude steps of a simulated ArduCopter.
  */
-export const getExampleAnalysis = <ThrowOnError extends boolean = false>(options?: Options<GetExampleAnalysisData, ThrowOnError>): RequestResult<GetExampleAnalysisResponses, GetExampleAnalysisErrors, ThrowOnError> => (options?.client ?? client).get<GetExampleAnalysisResponses, GetExampleAnalysisErrors, ThrowOnError>({ url: '/api/log-analyses/example', ...options });
+export const analyzeExample = <ThrowOnError extends boolean = false>(options?: Options<AnalyzeExampleData, ThrowOnError>): RequestResult<AnalyzeExampleResponses, AnalyzeExampleErrors, ThrowOnError> => (options?.client ?? client).post<AnalyzeExampleResponses, AnalyzeExampleErrors, ThrowOnError>({ url: '/api/log-analyses/example', ...options });
 
 /**
  * Start Campaign
@@ -732,6 +740,112 @@ export const startCampaign = <ThrowOnError extends boolean = false>(options: Opt
     ...options,
     headers: {
         'Content-Type': null,
+        ...options.headers
+    }
+});
+
+/**
+ * Delete Log
+ *
+ * Delete a log; of a vehicle without logs nothing is left.
+ */
+export const deleteLog = <ThrowOnError extends boolean = false>(options: Options<DeleteLogData, ThrowOnError>): RequestResult<DeleteLogResponses, DeleteLogErrors, ThrowOnError> => (options.client ?? client).delete<DeleteLogResponses, DeleteLogErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}', ...options });
+
+/**
+ * Get Log Analysis
+ *
+ * A stored answer, as it was given.
+ */
+export const getLogAnalysis = <ThrowOnError extends boolean = false>(options: Options<GetLogAnalysisData, ThrowOnError>): RequestResult<GetLogAnalysisResponses, GetLogAnalysisErrors, ThrowOnError> => (options.client ?? client).get<GetLogAnalysisResponses, GetLogAnalysisErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}', ...options });
+
+/**
+ * Keep Log
+ *
+ * Keep a log as a flight of the vehicle with this name, which is created if there is none. A vehicle is recognised
+ * by the hardware id in its logs; 409 if the name is that of another.
+ */
+export const keepLog = <ThrowOnError extends boolean = false>(options: Options<KeepLogData, ThrowOnError>): RequestResult<KeepLogResponses, KeepLogErrors, ThrowOnError> => (options.client ?? client).put<KeepLogResponses, KeepLogErrors, ThrowOnError>({
+    url: '/api/log-analyses/{log_id}/vehicle',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Get Log File
+ *
+ * A stored file; 404 if it is not stored.
+ */
+export const getLogFile = <ThrowOnError extends boolean = false>(options: Options<GetLogFileData, ThrowOnError>): RequestResult<GetLogFileResponses, GetLogFileErrors, ThrowOnError> => (options.client ?? client).get<GetLogFileResponses, GetLogFileErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}/file', ...options });
+
+/**
+ * Store Log File
+ *
+ * Store the file of a kept log too. All files together take at most GAINLINE_LOG_FILE_BYTES.
+ */
+export const storeLogFile = <ThrowOnError extends boolean = false>(options: Options<StoreLogFileData, ThrowOnError>): RequestResult<StoreLogFileResponses, StoreLogFileErrors, ThrowOnError> => (options.client ?? client).put<StoreLogFileResponses, StoreLogFileErrors, ThrowOnError>({
+    ...formDataBodySerializer,
+    url: '/api/log-analyses/{log_id}/file',
+    ...options,
+    headers: {
+        'Content-Type': null,
+        ...options.headers
+    }
+});
+
+/**
+ * Compare Logs
+ *
+ * Compare a log with an earlier one of the same vehicle: which parameters changed, and whether the later gains are
+ * better.
+ */
+export const compareLogs = <ThrowOnError extends boolean = false>(options: Options<CompareLogsData, ThrowOnError>): RequestResult<CompareLogsResponses, CompareLogsErrors, ThrowOnError> => (options.client ?? client).get<CompareLogsResponses, CompareLogsErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}/comparison', ...options });
+
+/**
+ * Export Log
+ *
+ * The answer and all parameters, for other programs.
+ */
+export const exportLog = <ThrowOnError extends boolean = false>(options: Options<ExportLogData, ThrowOnError>): RequestResult<ExportLogResponses, ExportLogErrors, ThrowOnError> => (options.client ?? client).get<ExportLogResponses, ExportLogErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}/export.json', ...options });
+
+/**
+ * Start Stored Campaign
+ *
+ * Create the campaign of a stored log, as from its file; 404 for one of takeoffs whose file is not stored.
+ */
+export const startStoredCampaign = <ThrowOnError extends boolean = false>(options: Options<StartStoredCampaignData, ThrowOnError>): RequestResult<StartStoredCampaignResponses, StartStoredCampaignErrors, ThrowOnError> => (options.client ?? client).post<StartStoredCampaignResponses, StartStoredCampaignErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}/campaign', ...options });
+
+/**
+ * List Logged Vehicles
+ *
+ * The vehicles with kept logs, the one that flew last first.
+ */
+export const listLoggedVehicles = <ThrowOnError extends boolean = false>(options?: Options<ListLoggedVehiclesData, ThrowOnError>): RequestResult<ListLoggedVehiclesResponses, ListLoggedVehiclesErrors, ThrowOnError> => (options?.client ?? client).get<ListLoggedVehiclesResponses, ListLoggedVehiclesErrors, ThrowOnError>({ url: '/api/logged-vehicles', ...options });
+
+/**
+ * Get Logged Vehicle
+ *
+ * A vehicle, and what its logs tell together.
+ */
+export const getLoggedVehicle = <ThrowOnError extends boolean = false>(options: Options<GetLoggedVehicleData, ThrowOnError>): RequestResult<GetLoggedVehicleResponses, GetLoggedVehicleErrors, ThrowOnError> => (options.client ?? client).get<GetLoggedVehicleResponses, GetLoggedVehicleErrors, ThrowOnError>({ url: '/api/logged-vehicles/{vehicle_id}', ...options });
+
+/**
+ * Get Trend
+ *
+ * Hover throttle, deviation, throttle activity and margin over the vehicle's logs.
+ */
+export const getTrend = <ThrowOnError extends boolean = false>(options: Options<GetTrendData, ThrowOnError>): RequestResult<GetTrendResponses, GetTrendErrors, ThrowOnError> => (options.client ?? client).get<GetTrendResponses, GetTrendErrors, ThrowOnError>({ url: '/api/logged-vehicles/{vehicle_id}/trend', ...options });
+
+/**
+ * Rename Logged Vehicle
+ */
+export const renameLoggedVehicle = <ThrowOnError extends boolean = false>(options: Options<RenameLoggedVehicleData, ThrowOnError>): RequestResult<RenameLoggedVehicleResponses, RenameLoggedVehicleErrors, ThrowOnError> => (options.client ?? client).put<RenameLoggedVehicleResponses, RenameLoggedVehicleErrors, ThrowOnError>({
+    url: '/api/logged-vehicles/{vehicle_id}/name',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
         ...options.headers
     }
 });

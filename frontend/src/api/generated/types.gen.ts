@@ -142,6 +142,58 @@ export type Advice = {
 };
 
 /**
+ * AnalysedLog
+ *
+ * A log whose answer is stored, with the version of Gainline that gave it.
+ */
+export type AnalysedLog = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * File Name
+     */
+    file_name: string;
+    /**
+     * Autopilot
+     */
+    autopilot: string;
+    grade: Grade;
+    /**
+     * null: not kept, and deleted after seven days
+     */
+    vehicle: LoggedVehicleBrief | null;
+    /**
+     * Hardware Id
+     *
+     * of the autopilot's board; empty: not in the log
+     */
+    hardware_id: string;
+    /**
+     * Program
+     *
+     * version of Gainline
+     */
+    program: string;
+    /**
+     * Flown At
+     */
+    flown_at: string | null;
+    /**
+     * Analysed At
+     */
+    analysed_at: string;
+    numbers: LogNumbers;
+    /**
+     * File Bytes
+     *
+     * size of the stored file; 0: not stored
+     */
+    file_bytes: number;
+};
+
+/**
  * AutopilotInfo
  *
  * An autopilot over MAVLink.
@@ -744,6 +796,25 @@ export type Column = {
      * Digits
      */
     digits: number | null;
+};
+
+/**
+ * CombinedVehicle
+ *
+ * The vehicle that all of its logs fit together; the hover throttle differs from flight to flight, and has the
+ * standard deviation of that.
+ */
+export type CombinedVehicle = {
+    /**
+     * Logs
+     *
+     * number of logs that tell the vehicle
+     */
+    logs: number;
+    hover_throttle: EstimatedValue;
+    thrust_slope: EstimatedValue;
+    motor_lag_s: EstimatedValue;
+    drag_1_s: EstimatedValue;
 };
 
 /**
@@ -1843,6 +1914,27 @@ export type GainChange = {
 };
 
 /**
+ * GainEffect
+ *
+ * What the change of the gains does to the error, in the manoeuvres and the weather of both logs: a factor with its
+ * 90 % interval, less than 1 if the later gains are better.
+ */
+export type GainEffect = {
+    /**
+     * Factor
+     */
+    factor: number;
+    /**
+     * Low
+     */
+    low: number;
+    /**
+     * High
+     */
+    high: number;
+};
+
+/**
  * GainsInManoeuvre
  *
  * A gain set in the same manoeuvre and weather.
@@ -2383,7 +2475,7 @@ export type LeaseRequest = {
 /**
  * LogAnalysis
  *
- * The result of a log analysis.
+ * The result of a log analysis, and where it is stored.
  */
 export type LogAnalysis = {
     /**
@@ -2442,6 +2534,45 @@ export type LogAnalysis = {
             [key: string]: Array<Card>;
         };
     };
+    log: LogPlace;
+};
+
+/**
+ * LogComparison
+ *
+ * A log compared with an earlier one.
+ */
+export type LogComparison = {
+    log: AnalysedLog;
+    before: AnalysedLog;
+    /**
+     * Verdict
+     *
+     * on the gains of the later log; null: they are the same
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
+    /**
+     * Confidence
+     */
+    confidence: number | null;
+    /**
+     * null: a log does not tell the vehicle, or the same gains
+     */
+    effect: GainEffect | null;
+    /**
+     * Sentence
+     */
+    sentence: string;
+    /**
+     * Notes
+     */
+    notes: Array<string>;
+    /**
+     * Parameters
+     *
+     * all that differ, gains first
+     */
+    parameters: Array<ParameterChange>;
 };
 
 /**
@@ -2482,6 +2613,94 @@ export type LogEvidence = {
 };
 
 /**
+ * LogExport
+ *
+ * A log for other programs: its answer, who gave it, its vehicle, and all of its parameters.
+ */
+export type LogExport = {
+    /**
+     * Schema Version
+     */
+    schema_version: 1;
+    /**
+     * File Name
+     */
+    file_name: string;
+    /**
+     * Autopilot
+     *
+     * its title
+     */
+    autopilot: string;
+    /**
+     * Release
+     *
+     * of the firmware; null: not in the log
+     */
+    release: string | null;
+    /**
+     * Frame
+     *
+     * of the vehicle; null: not in the log, or of no named kind
+     */
+    frame: string | null;
+    /**
+     * Vehicle
+     *
+     * system id of the one analysed, if the log has several
+     */
+    vehicle: number | null;
+    /**
+     * Vehicles
+     *
+     * titles of the autopilots of several, by system id
+     */
+    vehicles: {
+        [key: string]: string;
+    };
+    tuning: TuningAnswer;
+    /**
+     * Replica
+     */
+    replica: ReplicaAnswer | Refusal;
+    texts: Texts;
+    /**
+     * Program
+     *
+     * version of Gainline that gave the answer
+     */
+    program: string;
+    /**
+     * Flown At
+     */
+    flown_at: string | null;
+    /**
+     * Analysed At
+     */
+    analysed_at: string;
+    /**
+     * Vehicle Name
+     *
+     * null: not kept
+     */
+    vehicle_name: string | null;
+    /**
+     * Hardware Id
+     *
+     * empty: not in the log
+     */
+    hardware_id: string;
+    /**
+     * Parameters
+     *
+     * of the vehicle, as last known in the log
+     */
+    parameters: {
+        [key: string]: number;
+    };
+};
+
+/**
  * LogLine
  *
  * One log line: `details` are its further fields as text, `exception` is a traceback, empty without one.
@@ -2509,6 +2728,190 @@ export type LogLine = {
      * Exception
      */
     exception: string;
+};
+
+/**
+ * LogNumbers
+ *
+ * What lists and trends show of a log; null for what it does not tell.
+ */
+export type LogNumbers = {
+    hover_throttle: EstimatedValue | null;
+    thrust_slope: EstimatedValue | null;
+    /**
+     * Deviation M
+     *
+     * mean distance between reference and altitude
+     */
+    deviation_m: number | null;
+    /**
+     * Activity
+     *
+     * standard deviation of the demanded throttle about its 2 Hz low-pass, share of full
+     */
+    activity: number | null;
+    /**
+     * Margin
+     *
+     * of the gains flown; 0: less than 1, 8: at least 8
+     */
+    margin: number | null;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+};
+
+/**
+ * LogPlace
+ *
+ * A log, and its place among the others.
+ */
+export type LogPlace = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * File Name
+     */
+    file_name: string;
+    /**
+     * Autopilot
+     */
+    autopilot: string;
+    grade: Grade;
+    /**
+     * null: not kept, and deleted after seven days
+     */
+    vehicle: LoggedVehicleBrief | null;
+    /**
+     * Hardware Id
+     *
+     * of the autopilot's board; empty: not in the log
+     */
+    hardware_id: string;
+    /**
+     * Program
+     *
+     * version of Gainline
+     */
+    program: string;
+    /**
+     * Flown At
+     */
+    flown_at: string | null;
+    /**
+     * Analysed At
+     */
+    analysed_at: string;
+    numbers: LogNumbers;
+    /**
+     * File Bytes
+     *
+     * size of the stored file; 0: not stored
+     */
+    file_bytes: number;
+    /**
+     * Suggested Name
+     *
+     * of the vehicle, by the hardware id or the log; may be empty
+     */
+    suggested_name: string;
+    /**
+     * Is Recognised
+     *
+     * whether the hardware id is that of a vehicle with logs
+     */
+    is_recognised: boolean;
+    /**
+     * Previous Id
+     *
+     * the log before it of the same vehicle
+     */
+    previous_id: number | null;
+    /**
+     * Starts Campaign
+     *
+     * whether a campaign can start without the file
+     */
+    starts_campaign: boolean;
+};
+
+/**
+ * LoggedVehicle
+ *
+ * A vehicle whose logs are kept, with its newest log.
+ */
+export type LoggedVehicle = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Hardware Id
+     */
+    hardware_id: string | null;
+    /**
+     * Logs
+     *
+     * number of its logs
+     */
+    logs: number;
+    newest: AnalysedLog;
+};
+
+/**
+ * LoggedVehicleBrief
+ *
+ * The vehicle of a kept log.
+ */
+export type LoggedVehicleBrief = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * Name
+     */
+    name: string;
+};
+
+/**
+ * LoggedVehicleDetails
+ *
+ * A vehicle, and what its logs tell together.
+ */
+export type LoggedVehicleDetails = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Hardware Id
+     */
+    hardware_id: string | null;
+    /**
+     * Logs
+     *
+     * number of its logs
+     */
+    logs: number;
+    newest: AnalysedLog;
+    /**
+     * null: fewer than two logs tell the vehicle
+     */
+    combined: CombinedVehicle | null;
 };
 
 /**
@@ -2769,6 +3172,24 @@ export type Oscillation = {
 export type Outcome = 'converged' | 'budget' | 'stopped';
 
 /**
+ * Page[AnalysedLog]
+ */
+export type PageAnalysedLog = {
+    /**
+     * Items
+     */
+    items: Array<AnalysedLog>;
+    /**
+     * Total
+     */
+    total: number;
+    /**
+     * Next Cursor
+     */
+    next_cursor: string | null;
+};
+
+/**
  * Page[CampaignSummary]
  */
 export type PageCampaignSummary = {
@@ -2892,6 +3313,32 @@ export type PageVehicle = {
      * Next Cursor
      */
     next_cursor: string | null;
+};
+
+/**
+ * ParameterChange
+ *
+ * A parameter that is not the same in two logs; null where a log does not tell it.
+ */
+export type ParameterChange = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Group
+     *
+     * gain to be tuned; what else the vertical loop depends on; other; written by the autopilot
+     */
+    group: 'gain' | 'loop' | 'other' | 'self-written';
+    /**
+     * Before
+     */
+    before: number | null;
+    /**
+     * After
+     */
+    after: number | null;
 };
 
 /**
@@ -4768,6 +5215,18 @@ export type VehicleKindInfo = {
      * highest altitude that it is commanded to fly to; null: any
      */
     highest_set_point_m: number | null;
+};
+
+/**
+ * VehicleName
+ *
+ * Name of a vehicle whose logs are kept.
+ */
+export type VehicleName = {
+    /**
+     * Name
+     */
+    name: string;
 };
 
 /**
@@ -7615,6 +8074,56 @@ export type GetReproductionFigureResponses = {
 
 export type GetReproductionFigureResponse = GetReproductionFigureResponses[keyof GetReproductionFigureResponses];
 
+export type ListLogsData = {
+    body?: never;
+    path?: never;
+    query?: {
+        /**
+         * Vehicle
+         *
+         * a vehicle with kept logs
+         */
+        vehicle?: number | null;
+        /**
+         * Kept
+         *
+         * false: those that are kept for seven days only
+         */
+        kept?: boolean;
+        /**
+         * Limit
+         *
+         * maximum number of items on the page
+         */
+        limit?: number;
+        /**
+         * Cursor
+         *
+         * `next_cursor` of the previous page
+         */
+        cursor?: string | null;
+    };
+    url: '/api/log-analyses';
+};
+
+export type ListLogsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ListLogsError = ListLogsErrors[keyof ListLogsErrors];
+
+export type ListLogsResponses = {
+    /**
+     * Successful Response
+     */
+    200: PageAnalysedLog;
+};
+
+export type ListLogsResponse = ListLogsResponses[keyof ListLogsResponses];
+
 export type AnalyzeLogData = {
     body: {
         file: Blob | File;
@@ -7667,30 +8176,30 @@ export type AnalyzeLogResponses = {
 
 export type AnalyzeLogResponse = AnalyzeLogResponses[keyof AnalyzeLogResponses];
 
-export type GetExampleAnalysisData = {
+export type AnalyzeExampleData = {
     body?: never;
     path?: never;
     query?: never;
     url: '/api/log-analyses/example';
 };
 
-export type GetExampleAnalysisErrors = {
+export type AnalyzeExampleErrors = {
     /**
      * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
 
-export type GetExampleAnalysisError = GetExampleAnalysisErrors[keyof GetExampleAnalysisErrors];
+export type AnalyzeExampleError = AnalyzeExampleErrors[keyof AnalyzeExampleErrors];
 
-export type GetExampleAnalysisResponses = {
+export type AnalyzeExampleResponses = {
     /**
      * Successful Response
      */
     200: LogAnalysis;
 };
 
-export type GetExampleAnalysisResponse = GetExampleAnalysisResponses[keyof GetExampleAnalysisResponses];
+export type AnalyzeExampleResponse = AnalyzeExampleResponses[keyof AnalyzeExampleResponses];
 
 export type StartCampaignData = {
     body: {
@@ -7747,6 +8256,417 @@ export type StartCampaignResponses = {
 };
 
 export type StartCampaignResponse = StartCampaignResponses[keyof StartCampaignResponses];
+
+export type DeleteLogData = {
+    body?: never;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: never;
+    url: '/api/log-analyses/{log_id}';
+};
+
+export type DeleteLogErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type DeleteLogError = DeleteLogErrors[keyof DeleteLogErrors];
+
+export type DeleteLogResponses = {
+    /**
+     * Successful Response
+     */
+    204: void;
+};
+
+export type DeleteLogResponse = DeleteLogResponses[keyof DeleteLogResponses];
+
+export type GetLogAnalysisData = {
+    body?: never;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: never;
+    url: '/api/log-analyses/{log_id}';
+};
+
+export type GetLogAnalysisErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetLogAnalysisError = GetLogAnalysisErrors[keyof GetLogAnalysisErrors];
+
+export type GetLogAnalysisResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogAnalysis;
+};
+
+export type GetLogAnalysisResponse = GetLogAnalysisResponses[keyof GetLogAnalysisResponses];
+
+export type KeepLogData = {
+    body: VehicleName;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: never;
+    url: '/api/log-analyses/{log_id}/vehicle';
+};
+
+export type KeepLogErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type KeepLogError = KeepLogErrors[keyof KeepLogErrors];
+
+export type KeepLogResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogPlace;
+};
+
+export type KeepLogResponse = KeepLogResponses[keyof KeepLogResponses];
+
+export type GetLogFileData = {
+    body?: never;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: {
+        /**
+         * Companion
+         *
+         * Paparazzi's .log instead
+         */
+        companion?: boolean;
+    };
+    url: '/api/log-analyses/{log_id}/file';
+};
+
+export type GetLogFileErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetLogFileError = GetLogFileErrors[keyof GetLogFileErrors];
+
+export type GetLogFileResponses = {
+    /**
+     * Successful Response
+     */
+    200: Blob | File;
+};
+
+export type GetLogFileResponse = GetLogFileResponses[keyof GetLogFileResponses];
+
+export type StoreLogFileData = {
+    body: {
+        file: Blob | File;
+        /**
+         * the .log file that Paparazzi writes next to a .data file
+         */
+        companion?: Blob | File;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: never;
+    url: '/api/log-analyses/{log_id}/file';
+};
+
+export type StoreLogFileErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type StoreLogFileError = StoreLogFileErrors[keyof StoreLogFileErrors];
+
+export type StoreLogFileResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogPlace;
+};
+
+export type StoreLogFileResponse = StoreLogFileResponses[keyof StoreLogFileResponses];
+
+export type CompareLogsData = {
+    body?: never;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: {
+        /**
+         * Before
+         *
+         * by default the log before it
+         */
+        before?: number | null;
+    };
+    url: '/api/log-analyses/{log_id}/comparison';
+};
+
+export type CompareLogsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type CompareLogsError = CompareLogsErrors[keyof CompareLogsErrors];
+
+export type CompareLogsResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogComparison;
+};
+
+export type CompareLogsResponse = CompareLogsResponses[keyof CompareLogsResponses];
+
+export type ExportLogData = {
+    body?: never;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: never;
+    url: '/api/log-analyses/{log_id}/export.json';
+};
+
+export type ExportLogErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ExportLogError = ExportLogErrors[keyof ExportLogErrors];
+
+export type ExportLogResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogExport;
+};
+
+export type ExportLogResponse = ExportLogResponses[keyof ExportLogResponses];
+
+export type StartStoredCampaignData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: {
+        /**
+         * Vehicle
+         */
+        vehicle?: number | null;
+    };
+    url: '/api/log-analyses/{log_id}/campaign';
+};
+
+export type StartStoredCampaignErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type StartStoredCampaignError = StartStoredCampaignErrors[keyof StartStoredCampaignErrors];
+
+export type StartStoredCampaignResponses = {
+    /**
+     * Successful Response
+     */
+    201: Campaign;
+};
+
+export type StartStoredCampaignResponse = StartStoredCampaignResponses[keyof StartStoredCampaignResponses];
+
+export type ListLoggedVehiclesData = {
+    body?: never;
+    path?: never;
+    query?: never;
+    url: '/api/logged-vehicles';
+};
+
+export type ListLoggedVehiclesErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ListLoggedVehiclesError = ListLoggedVehiclesErrors[keyof ListLoggedVehiclesErrors];
+
+export type ListLoggedVehiclesResponses = {
+    /**
+     * Response List Logged Vehicles
+     *
+     * Successful Response
+     */
+    200: Array<LoggedVehicle>;
+};
+
+export type ListLoggedVehiclesResponse = ListLoggedVehiclesResponses[keyof ListLoggedVehiclesResponses];
+
+export type GetLoggedVehicleData = {
+    body?: never;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/logged-vehicles/{vehicle_id}';
+};
+
+export type GetLoggedVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetLoggedVehicleError = GetLoggedVehicleErrors[keyof GetLoggedVehicleErrors];
+
+export type GetLoggedVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    200: LoggedVehicleDetails;
+};
+
+export type GetLoggedVehicleResponse = GetLoggedVehicleResponses[keyof GetLoggedVehicleResponses];
+
+export type GetTrendData = {
+    body?: never;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+    };
+    url: '/api/logged-vehicles/{vehicle_id}/trend';
+};
+
+export type GetTrendErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetTrendError = GetTrendErrors[keyof GetTrendErrors];
+
+export type GetTrendResponses = {
+    /**
+     * Successful Response
+     */
+    200: Card;
+};
+
+export type GetTrendResponse = GetTrendResponses[keyof GetTrendResponses];
+
+export type RenameLoggedVehicleData = {
+    body: VehicleName;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/logged-vehicles/{vehicle_id}/name';
+};
+
+export type RenameLoggedVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type RenameLoggedVehicleError = RenameLoggedVehicleErrors[keyof RenameLoggedVehicleErrors];
+
+export type RenameLoggedVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    200: LoggedVehicleBrief;
+};
+
+export type RenameLoggedVehicleResponse = RenameLoggedVehicleResponses[keyof RenameLoggedVehicleResponses];
 
 export type CompareFlightsData = {
     body?: never;

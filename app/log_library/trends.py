@@ -1,0 +1,52 @@
+"""What the logs of a vehicle tell together, and over its life."""
+
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.core.formatting import count
+from app.figures.base import Card, card_of
+from app.figures.panels import Line, Panel, PanelsFigure, Plot
+from app.figures.theme import ThemeName
+from app.log_library import repository
+from app.log_library.library_schemas import LoggedVehicleDetails, LogNumbers
+from app.log_library.stored_logs import log_view, vehicle_view
+
+_QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]]]] = (
+    ("Hover throttle", 3, lambda found: None if found.hover_throttle is None else found.hover_throttle.mean),
+    ("Mean deviation (mm)", 1, lambda found: None if found.deviation_m is None else 1e3 * found.deviation_m),
+    ("Throttle activity", 4, attrgetter("activity")),
+    ("Margin", 1, attrgetter("margin")),
+)
+"""Title, decimals and value of a panel."""
+
+
+def get_vehicle(session: Session, vehicle_id: int) -> LoggedVehicleDetails:
+    """A vehicle with what its logs tell together. Raises NotFoundError."""
+    vehicle, logs = repository.get_vehicle(session, vehicle_id), repository.logs_of(session, vehicle_id)
+    return LoggedVehicleDetails(**dict(vehicle_view(vehicle, len(logs), logs[-1])), combined=None)
+
+
+def trend_figure(session: Session, vehicle_id: int, theme: ThemeName) -> Card:
+    """Hover throttle, deviation, activity and margin by the number of the log, oldest first. Raises NotFoundError."""
+    vehicle = repository.get_vehicle(session, vehicle_id)
+    logs = [log_view(row).numbers for row in repository.logs_of(session, vehicle_id)]
+    return card_of(PanelsFigure(trend_plot(vehicle.name, logs), theme_name=theme))
+
+
+def trend_plot(name: str, logs: Sequence[LogNumbers]) -> Plot:
+    """A panel for each quantity that a log tells."""
+    panels = []
+    for title, digits, value_of in _QUANTITIES:
+        told = {float(place): value for place, log in enumerate(logs, 1) if (value := value_of(log)) is not None}
+        line = Line(name=title, style="measured", x=tuple(told), y=tuple(told.values()), marks=True)
+        panels += [Panel(y_title=title, digits=digits, lines=(line,))] * bool(told)
+    return Plot(
+        title=f"Trend of {name}",
+        summary=f"Hover throttle, mean deviation, throttle activity and margin in {count(len(logs), 'log')}.",
+        x_title="Log",
+        x_digits=0,
+        panels=tuple(panels),
+    )
