@@ -1,0 +1,99 @@
+"""Logs of one vehicle fitted together from what is stored of each, against the fit of their rows together, against
+numbers by hand, and against the truth."""
+
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from app.core.analysis.combined_fit import FITTED, LogFit, combine, log_fit
+from app.core.analysis.loop import LoggedFlight
+from app.core.analysis.vehicle_fit import fit_copter
+from tests.core.analysis.flights import GUSTY, simulated_flight
+from tests.core.analysis.px4_flights import simulated_px4
+from tests.core.tuning.flying import compiled_only
+
+USUAL = ((1.0, 0.25), (0.06, 0.04), (0.4, 0.25))
+
+
+def told(
+    slope: float, deviation: float, *, shared: float = 0.0, hover: float = 0.4, usual: float = USUAL[0][1]
+) -> LogFit:
+    """A fit that holds the usual lag and drag, and whose flight alone tells the slope with this deviation."""
+    variance = 1.0 / (deviation**-2 + usual**-2)
+    mean = variance * (slope * deviation**-2 + USUAL[0][0] * usual**-2)
+    return LogFit(
+        mean=[hover, mean, USUAL[1][0], USUAL[2][0]],
+        covariance=np.diag([1e-6, variance + shared**2, USUAL[1][1] ** 2, USUAL[2][1] ** 2]).tolist(),
+        usual=[(USUAL[0][0], usual), *USUAL[1:]],
+        shared=[shared, 0.0, 0.0],
+    )
+
+
+def test_what_is_usual_counts_once() -> None:
+    found = combine([told(1.2, 0.1), told(1.3, 0.2)])
+    precision = 1.0 / 0.1**2 + 1.0 / 0.2**2 + 1.0 / 0.25**2
+    assert found.mean["thrust_slope"] == pytest.approx((1.2 / 0.01 + 1.3 / 0.04 + 1.0 / 0.0625) / precision)
+    assert found.deviation["thrust_slope"] == pytest.approx(precision**-0.5)
+    assert (found.mean["motor_lag_s"], found.mean["drag_1_s"]) == pytest.approx((0.06, 0.4))
+    assert (found.remaining["motor_lag_s"], found.remaining["drag_1_s"]) == pytest.approx((1.0, 1.0))
+
+
+def test_one_log_together_with_none_is_itself() -> None:
+    found = combine([told(1.2, 0.1, shared=0.05)])
+    assert found.deviation["thrust_slope"] ** 2 == pytest.approx(told(1.2, 0.1, shared=0.05).covariance[1][1])
+    assert list(found.remaining.values()) == pytest.approx([1.0, 1.0, 1.0])
+    assert (found.contradiction, found.hover_spread) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("logs", [2, 4])
+def test_the_deviation_of_equal_logs_falls_with_their_root(logs: int) -> None:
+    """But for what they share, and for what is usual, which is wide here."""
+    fits = [told(1.2, 0.1, shared=0.06, usual=5.0)] * logs
+    own = combine(fits).deviation["thrust_slope"] ** 2 - 0.06**2
+    assert np.sqrt(own) == pytest.approx(0.1 / np.sqrt(logs), rel=0.01)
+
+
+def test_a_log_that_tells_less_than_is_usual_adds_nothing() -> None:
+    """As draws may come out, by chance."""
+    vague = replace(told(1.2, 0.1), covariance=np.diag([1e-6, 0.3**2, 0.05**2, 0.3**2]).tolist())
+    found = combine([vague, told(1.2, 0.1)])
+    assert found.deviation == pytest.approx(combine([told(1.2, 0.1)]).deviation)
+
+
+def test_a_deviation_below_what_all_share_is_not_believed() -> None:
+    sure = told(1.2, 0.01, shared=0.06)
+    found = combine([replace(sure, covariance=np.diag([1e-6, 1e-4, 1.6e-3, 0.0625]).tolist())] * 3)
+    assert found.deviation["thrust_slope"] > 0.06
+
+
+def test_other_propellers_are_noticed() -> None:
+    assert combine([told(1.2, 0.05), told(1.25, 0.05)]).is_one_vehicle
+    changed = combine([told(0.9, 0.05), told(1.25, 0.05)])
+    assert not changed.is_one_vehicle
+    assert changed.contradiction > 0.999
+
+
+def test_the_hover_throttle_stays_that_of_each_log() -> None:
+    found = combine([told(1.2, 0.1, hover=each) for each in (0.38, 0.4, 0.42)])
+    assert found.hover_throttles == [0.38, 0.4, 0.42]
+    assert found.hover_spread == pytest.approx(0.02)
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    "flights",
+    [[simulated_flight(GUSTY, seed=each) for each in (1, 2)], [simulated_px4(seed=each) for each in (1, 2)]],
+)
+def test_two_logs_tell_what_their_rows_together_tell(flights: list[LoggedFlight]) -> None:
+    fits = [log_fit(fit_copter(each), each.loop) for each in flights]
+    stored = [LogFit(**json.loads(json.dumps(asdict(each)))) for each in fits]
+    assert combine(stored) == combine(fits)
+    found, together = combine(fits), fit_copter(*flights)
+    for name in FITTED[1:]:
+        deviation = getattr(together.deviation, name)
+        assert found.mean[name] == pytest.approx(getattr(together.mean, name), abs=deviation)
+        shared = fits[0].shared[FITTED.index(name) - 1]
+        assert 0.9 * deviation < found.deviation[name] < 1.1 * np.hypot(deviation, shared)
+        assert 0.7 <= found.remaining[name] < 1.0
