@@ -17,6 +17,7 @@ from app.autopilots.replicas import REPLICAS, traced
 from app.autopilots.takeoffs import Takeoff
 from app.campaigns.schemas import Definition
 from app.core.analysis.analysis import Grade, analyze
+from app.core.analysis.combined_fit import LogFit, log_fit
 from app.core.analysis.description import Description, describe
 from app.core.analysis.hand_rules import UsualMargins, usual_margins
 from app.core.analysis.loop import LoggedFlight
@@ -79,6 +80,7 @@ class AnalysedContent:
     vehicle_name: str = ""
     flown_at: datetime | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    fit: LogFit | None = None
     definition: Definition | None = None
 
 
@@ -127,19 +129,20 @@ def analyze_content(
         plots={"tuning": tuning.plots, "replica": replica.plots},
         numbers=tuning.numbers,
         flown_at=None if recording is None else recording.started_at,
+        fit=tuning.fit,
         definition=tuning.definition,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Answered(Generic[_Answer]):
-    """A part of the answer: in numbers, for a person, and its figures; numbers for lists, and the campaign that can
-    start from it."""
+    """A part of the answer: in numbers, for a person, and its figures; and what the library keeps of it."""
 
     answer: _Answer
     texts: PartTexts
     plots: list[Plot] = field(default_factory=list)
     numbers: LogNumbers = field(default_factory=LogNumbers)
+    fit: LogFit | None = None
     definition: Definition | None = None
 
 
@@ -170,11 +173,17 @@ def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[T
     if isinstance(flown, LoggedFlight):
         flight = analyze(flown)
         answer, texts = manoeuvres.answer_of(flight, name, flown.assumed)
-        start = manoeuvres.start_of(flight, name) if answer.starts_campaign else None
-        return _Answered(answer, texts, [manoeuvres.plot_of(flight)], manoeuvres.listed_numbers(flight), start)
+        return _Answered(
+            answer,
+            texts,
+            [manoeuvres.plot_of(flight)],
+            numbers=manoeuvres.listed_numbers(flight),
+            fit=log_fit(flight.estimate, flight.loop),
+            definition=manoeuvres.start_of(flight, name) if answer.starts_campaign else None,
+        )
     takeoff = analyze_takeoffs(takeoffs.logged_takeoffs(flown, name=name))
     answer, texts = takeoffs.answer_of(takeoff, name)
-    return _Answered(answer, texts, [takeoffs.plot_of(takeoff)], takeoffs.listed_numbers(takeoff))
+    return _Answered(answer, texts, [takeoffs.plot_of(takeoff)], numbers=takeoffs.listed_numbers(takeoff))
 
 
 def _margins(recording: Recording, description: Description | None) -> UsualMargins | None:

@@ -157,6 +157,12 @@ class CombinedVehicle(Schema):
     thrust_slope: EstimatedValue
     motor_lag_s: EstimatedValue
     drag_1_s: EstimatedValue
+    remaining: Annotated[
+        Mapping[str, float], Field(description="standard deviations as a share of the least that one log alone has")
+    ]
+    is_one_vehicle: Annotated[
+        bool, Field(description="false: thrust slopes differ, as after a change of propellers or motors")
+    ]
 
 
 class LoggedVehicleDetails(LoggedVehicle):

@@ -1,6 +1,7 @@
 """Operations on analysed logs: each is stored when it is analysed, kept as a flight of a vehicle, or deleted."""
 
 import hashlib
+from dataclasses import asdict
 from datetime import timedelta
 from pathlib import PurePath
 from typing import Final
@@ -53,6 +54,7 @@ def store(session: Session, found: AnalysedContent, digest: str, file_digest: st
     row.hardware_id, row.vehicle_name = found.hardware_id, found.vehicle_name
     row.flown_at, row.analysed_at, row.ordered_at = found.flown_at, now, found.flown_at or now
     row.numbers = found.numbers.model_dump(mode="json")
+    row.fit = None if found.fit is None else asdict(found.fit)
     row.answer = stored_answers.pack(found)
     return added(session, row).id
 

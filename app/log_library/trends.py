@@ -2,16 +2,20 @@
 
 from collections.abc import Callable, Sequence
 from operator import attrgetter
+from statistics import fmean
 from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.core.analysis.combined_fit import LogFit, combine
 from app.core.formatting import count
+from app.db.models import AnalysedLogRow
 from app.figures.base import Card, card_of
 from app.figures.panels import Line, Panel, PanelsFigure, Plot
 from app.figures.theme import ThemeName
 from app.log_library import repository
-from app.log_library.library_schemas import LoggedVehicleDetails, LogNumbers
+from app.log_library.library_schemas import CombinedVehicle, LoggedVehicleDetails, LogNumbers
+from app.log_library.schemas import EstimatedValue
 from app.log_library.stored_logs import log_view, vehicle_view
 
 _QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]]]] = (
@@ -26,7 +30,20 @@ _QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]
 def get_vehicle(session: Session, vehicle_id: int) -> LoggedVehicleDetails:
     """A vehicle with what its logs tell together. Raises NotFoundError."""
     vehicle, logs = repository.get_vehicle(session, vehicle_id), repository.logs_of(session, vehicle_id)
-    return LoggedVehicleDetails(**dict(vehicle_view(vehicle, len(logs), logs[-1])), combined=None)
+    return LoggedVehicleDetails(**dict(vehicle_view(vehicle, len(logs), logs[-1])), combined=_combined(logs))
+
+
+def _combined(logs: Sequence[AnalysedLogRow]) -> CombinedVehicle | None:
+    """What those under the newest log's autopilot tell together; None if fewer than two tell the vehicle."""
+    fits = [LogFit(**row.fit) for row in logs if row.fit is not None and row.autopilot == logs[-1].autopilot]
+    if len(fits) < 2:
+        return None
+    found = combine(fits)
+    hover = EstimatedValue(mean=fmean(found.hover_throttles), deviation=found.hover_spread)
+    fitted = {name: EstimatedValue(mean=found.mean[name], deviation=found.deviation[name]) for name in found.mean}
+    return CombinedVehicle(
+        logs=len(fits), hover_throttle=hover, **fitted, remaining=found.remaining, is_one_vehicle=found.is_one_vehicle
+    )
 
 
 def trend_figure(session: Session, vehicle_id: int, theme: ThemeName) -> Card:
