@@ -247,6 +247,8 @@ class Autopilot:
     """Messages asked for, without lasting changes."""
     set_point_telemetry: tuple[MessageRequest, ...] = ()
     """Further ones for a flight with several set points."""
+    sends_hardware_id: bool = True
+    """Whether the id that it sends with its version is that of its board."""
     reports_version: bool = True
     """Whether it replies to a request for its version; otherwise it sends that unrequested, or never."""
     arming_checks: Callable[[], ArmingChecks] = ArmingChecks

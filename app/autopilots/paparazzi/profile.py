@@ -189,6 +189,7 @@ PAPARAZZI: Final = Autopilot(
         "SCRIPT_CURRENT": lambda message: BlockEntered(int(number(message, "seq"))),
         "AUTOPILOT_VERSION": _version,
     },
+    sends_hardware_id=False,
     reports_version=False,
     steps=_steps,
     holds_first=False,
