@@ -3,7 +3,7 @@ are read, and what is sent to it."""
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final, Literal
@@ -225,6 +225,12 @@ class Autopilot:
     loop_parameters: tuple[tuple[str, ...], ...] = ()
     """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set points.
     None if the replica of its loop has no parameters but its gains."""
+    further_gains: tuple[str, ...] = ()
+    """Gains beside those that its experiments tune, and those of other releases, from the outer loops to the inner."""
+    self_written: str = r"\Z.\A"
+    """Names, as a pattern, of parameters that it writes by itself; by default none."""
+    in_names_of: Callable[[Mapping[str, float], Collection[str]], Mapping[str, float]] = lambda values, _own: values
+    """Returns parameters by the names and in the units of a release that has these names."""
     may_lack: frozenset[str] = frozenset()
     """Those of them that some releases lack, whose replica then has their default."""
     hover_limits: Callable[[Mapping[str, float]], HoverLimits | None] = lambda _parameters: None
