@@ -12,6 +12,7 @@ from app.autopilots import commands, mavlink
 from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
 from app.autopilots.dialects import Dialect, Message
 from app.autopilots.measurements import Measurement, VehicleEvent
+from app.autopilots.parameter_file import NAMES_AND_VALUES, ParameterFormat
 from app.core.errors import GainlineError, GainsError, Problem
 from app.core.experiments.base import Experiment
 from app.core.policy import Gain, Gains, shortened
@@ -225,6 +226,8 @@ class Autopilot:
     loop_parameters: tuple[tuple[str, ...], ...] = ()
     """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set points.
     None if the replica of its loop has no parameters but its gains."""
+    parameter_file: ParameterFormat = NAMES_AND_VALUES
+    """How gains are written into a file for it."""
     further_gains: tuple[str, ...] = ()
     """Gains beside those that its experiments tune, and those of other releases, from the outer loops to the inner."""
     self_written: str = r"\Z.\A"

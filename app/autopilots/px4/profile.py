@@ -12,6 +12,7 @@ from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
+from app.autopilots.px4.parameter_file import PARAMETER_FILE
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME, HOVER_THRUSTS, hover_deviation, hover_limits
 from app.autopilots.px4.replica.parameters import ESTIMATOR_NAMES, LOOP_NAMES, THRUST_GAINS, UNSUPPORTED
 from app.core.errors import InputError
@@ -115,6 +116,7 @@ PX4: Final = Autopilot(
     gain_sets=(on_board(GAINS, integrating="MPC_Z_VEL_I_ACC"),),
     sends_integers_bytewise=True,
     loop_parameters=(LOOP_NAMES,),
+    parameter_file=PARAMETER_FILE,
     further_gains=_FURTHER_GAINS,
     self_written=_SELF_WRITTEN,
     may_lack=frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME}),

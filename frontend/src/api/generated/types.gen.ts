@@ -324,6 +324,12 @@ export type Campaign = {
      * of the winner of a finished campaign: candidate until it and the first gains were flown at least twice, then confirmed if it is better
      */
     standing: 'candidate' | 'confirmed' | 'not confirmed' | null;
+    /**
+     * Parameter File
+     *
+     * name of the file with the best gains of a finished campaign; null if none are better
+     */
+    parameter_file: string | null;
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
@@ -5481,6 +5487,36 @@ export type PromoteBestResponses = {
 };
 
 export type PromoteBestResponse = PromoteBestResponses[keyof PromoteBestResponses];
+
+export type GetParameterFileData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/parameter-file';
+};
+
+export type GetParameterFileErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetParameterFileError = GetParameterFileErrors[keyof GetParameterFileErrors];
+
+export type GetParameterFileResponses = {
+    /**
+     * Successful Response
+     */
+    200: string;
+};
+
+export type GetParameterFileResponse = GetParameterFileResponses[keyof GetParameterFileResponses];
 
 export type GetStatisticsData = {
     body?: never;
