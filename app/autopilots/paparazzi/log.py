@@ -263,7 +263,7 @@ class _Configuration:
             self._is_mine = given.get("ac_id") == self.aircraft
             self.is_described |= self._is_mine
             if self._is_mine:
-                self.name = f"{given.get('name', '')[:_LONGEST_NAME].strip()} ({self.aircraft})"
+                self.name = f"{given.get('name', '')[:_LONGEST_NAME]} ({self.aircraft})".strip()
         elif not self._is_mine:
             return
         elif kind == "generated_settings":
