@@ -3,7 +3,7 @@ are read, and what is sent to it."""
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final, Literal
@@ -12,6 +12,7 @@ from app.autopilots import commands, mavlink
 from app.autopilots.commands import Action, Ask, MessageRequest, Outgoing, Setting, Step, Target
 from app.autopilots.dialects import Dialect, Message
 from app.autopilots.measurements import Measurement, VehicleEvent
+from app.autopilots.parameter_file import NAMES_AND_VALUES, ParameterFormat
 from app.core.errors import GainlineError, GainsError, Problem
 from app.core.experiments.base import Experiment
 from app.core.policy import Gain, Gains, shortened
@@ -225,6 +226,14 @@ class Autopilot:
     loop_parameters: tuple[tuple[str, ...], ...] = ()
     """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set points.
     None if the replica of its loop has no parameters but its gains."""
+    parameter_file: ParameterFormat = NAMES_AND_VALUES
+    """How gains are written into a file for it."""
+    further_gains: tuple[str, ...] = ()
+    """Gains beside those that its experiments tune, and those of other releases, from the outer loops to the inner."""
+    self_written: str = r"\Z.\A"
+    """Names, as a pattern, of parameters that it writes by itself; by default none."""
+    in_names_of: Callable[[Mapping[str, float], Collection[str]], Mapping[str, float]] = lambda values, _own: values
+    """Returns parameters by the names and in the units of a release that has these names."""
     may_lack: frozenset[str] = frozenset()
     """Those of them that some releases lack, whose replica then has their default."""
     hover_limits: Callable[[Mapping[str, float]], HoverLimits | None] = lambda _parameters: None
@@ -247,6 +256,8 @@ class Autopilot:
     """Messages asked for, without lasting changes."""
     set_point_telemetry: tuple[MessageRequest, ...] = ()
     """Further ones for a flight with several set points."""
+    sends_hardware_id: bool = True
+    """Whether the id that it sends with its version is that of its board."""
     reports_version: bool = True
     """Whether it replies to a request for its version; otherwise it sends that unrequested, or never."""
     arming_checks: Callable[[], ArmingChecks] = ArmingChecks

@@ -57,13 +57,7 @@ def signals_of(recording: Recording) -> FlightSignals | None:
 def loop_of(recording: Recording, at_s: float, hover_throttle: float) -> AltitudeLoop | None:
     """The loop with the parameters at a time, of a vehicle that hovers with this throttle; None if the recording lacks
     its gains, or a replica does not have it."""
-    given: dict[str, float] = {}
-    for each in sorted(recording.settings, key=lambda setting: setting.time_s):
-        name, value = in_older_names(each.name, each.value)
-        if each.time_s <= at_s:
-            given[name] = value
-        else:
-            given.setdefault(name, value)
+    given = dict(in_older_names(*each) for each in recording.parameters_at(at_s).items())
     thrust_gains_at = None
     if "thrust_target" in recording.columns and has_thrust_gains(recording):
         thrust_gains_at, given = hover_throttle, in_accelerations(given, hover_throttle)

@@ -146,14 +146,40 @@ def landed_state(message: Message) -> LandedState | None:
     return None if on_ground is None else LandedState(on_ground=on_ground)
 
 
+def hardware_id(digits: str) -> str:
+    """The id of a board, by which its logs are told from others', in lower-case hexadecimal digits as in `Version.uid`;
+    empty for what many vehicles share: no id, or the text that simulations and Linux computers send in place of one.
+
+    Over MAVLink 1, which lacks `uid2`, a board has a shorter id than elsewhere.
+    """
+    try:
+        raw = bytes.fromhex(digits)
+    except ValueError:
+        return ""
+    is_unique = len(set(raw)) >= _FEWEST_BYTES and not raw[_SERIAL].isalnum()
+    return raw.hex() if is_unique else ""
+
+
+UID2_BYTES: Final = 18
+_FEWEST_BYTES: Final = 4
+"""An id with fewer different bytes is a filler: zeros, 0xFF, or the kind of processor alone."""
+_SERIAL: Final = slice(1, 4)
+"""Numbers in the ids of processors: the place on the wafer, or the kind of processor."""
+
+
 def version(message: Message) -> Version | None:
     """Read AUTOPILOT_VERSION: major, minor and patch in one byte each, and the hardware id, preferably the newer and
     longer `uid2`, in hexadecimal digits; None if it has neither."""
     packed = int(number(message, "flight_sw_version"))
     release = f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}" if packed else ""
     short, long = getattr(message, "uid"), bytes(getattr(message, "uid2"))  # noqa: B009 - the library has no types
-    uid = long.hex() if any(long) else f"{short:016x}" if short else ""
+    uid = uid_of(short.to_bytes(8, "little"), long)
     return Version(release, uid) if release or uid else None
+
+
+def uid_of(uid: bytes, uid2: bytes) -> str:
+    """The hardware id in hexadecimal digits from the fields of AUTOPILOT_VERSION, as bytes; empty if both are 0."""
+    return uid2.hex() if any(uid2) else uid[::-1].hex() if any(uid) else ""
 
 
 def bytewise_integer(value: float) -> int:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from itertools import groupby
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Final, Self
 
 import numpy as np
@@ -187,10 +187,11 @@ class Recording:
     as they are known, one of `OTHER_FRAMES` if it is no copter with several rotors. `sources` are the messages
     that it has, of which some are columns. `in_air` are the intervals from lift-off to touchdown, `armed`
     those with the motors armed, both as reported by the autopilot and in order; None if it does not report them.
-    `blocks` are the intervals in blocks of a flight plan, each from the command that activated it. `notes` say what was
-    lost or damaged, and `remarks` how takeoffs are found for want of a message. `started_at` is the
-    date, UTC, of its 0 s, None if unknown. `others` are those of other vehicles in the same log, and `heard_s` the time
-    of one clock for all, s, at which each is heard first.
+    `hardware_id` is that of the board, as `mavlink.hardware_id` has it, and `vehicle_name` the vehicle's own; empty if
+    the log does not tell, as in simulations. `blocks` are the intervals in blocks of a flight plan, each from the
+    command that activated it. `notes` say what was lost or damaged, and `remarks` how takeoffs are found for want of a
+    message. `started_at` is the date, UTC, of its 0 s, None if unknown. `others` are those of other vehicles in the
+    same log, and `heard_s` the time of one clock for all, s, at which each is heard first.
     """
 
     title: str
@@ -200,6 +201,8 @@ class Recording:
     firmware: str = ""
     release: str = ""
     frame: str = ""
+    hardware_id: str = ""
+    vehicle_name: str = ""
     columns: Mapping[str, Column]
     sources: Collection[str] = ()
     settings: Sequence[Setting] = ()
@@ -224,6 +227,31 @@ class Recording:
     def history(self, names: Collection[str]) -> ParameterHistory:
         """Of these parameters."""
         return ParameterHistory.of((each.time_s, each.name, each.value) for each in self.settings if each.name in names)
+
+    def parameters_at(self, time_s: float) -> dict[str, float]:
+        """All parameters by the firmware's names, as known at a time; those first reported later as they are then, and
+        none that is unknown at the time."""
+        known: dict[str, float] = {}
+        for each in sorted(self.settings, key=attrgetter("time_s")):
+            if each.time_s <= time_s or each.name not in known:
+                known[each.name] = each.value
+        return {name: value for name, value in known.items() if np.isfinite(value)}
+
+
+def final_parameters(recording: Recording) -> dict[str, float]:
+    """All parameters of a log by the firmware's names, Paparazzi's gains by their names here, as last known in flight:
+    what is written after the last landing has not flown."""
+    ended_s = np.inf
+    if spans := recording.in_air or recording.armed:
+        ended_s = spans[-1].end_s
+    else:
+        for event in sorted(recording.events_of(*_BEGIN_FLIGHT, *_END_FLIGHT), key=attrgetter("time_s")):
+            ended_s = np.inf if event.kind in _BEGIN_FLIGHT else min(ended_s, event.time_s)
+    return recording.parameters_at(ended_s)
+
+
+_BEGIN_FLIGHT: Final = (EventKind.TAKEOFF, EventKind.MOTORS_ON, EventKind.LIFT_OFF)
+_END_FLIGHT: Final = (EventKind.LANDING, EventKind.MOTORS_OFF)
 
 
 def date_of(utc_s: float) -> datetime | None:

@@ -35,6 +35,11 @@ EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType(
 )
 """Those of the default autopilot first, then the others' by rank."""
 
+TUNED: Final[Mapping[str, Autopilot]] = MappingProxyType(
+    {experiment.name: autopilot for autopilot in AUTOPILOTS.values() for experiment in autopilot.experiments}
+)
+"""The autopilots whose gains experiments tune, by the names of these."""
+
 REPLACEMENTS: Final[Mapping[str, str]] = MappingProxyType(
     {
         without_model.name: modelled.name

@@ -17,6 +17,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.autopilots.autopilot import GainParameter
+from app.autopilots.mavlink import UID2_BYTES, hardware_id, uid_of
 from app.autopilots.recording import (
     CLOCK_SET_S,
     LONGEST_INTERVAL_S,
@@ -80,6 +81,8 @@ _IGNORES_Z: Final = 4
 _IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
 _IGNORES_ATTITUDE: Final = 128
 _INTEGERS: Final = range(1, 9)
+_UID: Final = slice(8, 16)
+"""The place of the shorter hardware id in AUTOPILOT_VERSION."""
 
 
 def read_tlog(stream: BinaryIO) -> Recording:
@@ -153,6 +156,7 @@ class _Decoder:
     _heard_s: float = -np.inf
     _mode: int | None = None
     _release: str = ""
+    _hardware_id: str = ""
     _is_fed: bool = False
     """Whether the last position target for it has more than a position, which it does not report."""
 
@@ -175,6 +179,7 @@ class _Decoder:
             autopilot=autopilot,
             system=self.vehicle.system,
             release=self._release,
+            hardware_id=self._hardware_id,
             frame=self.vehicle.frame,
             started_at=date_of(self._clock.zero_s),
             heard_s=self._clock.first_heard_s,
@@ -260,6 +265,9 @@ class _Decoder:
 
     def _version(self, message: Message) -> None:
         self._release = release_of(int(message["flight_sw_version"])) or self._release
+        if self.vehicle.autopilot.sends_hardware_id:
+            uid2 = bytes(int(message[f"uid2[{place}]"]) for place in range(UID2_BYTES))
+            self._hardware_id = self._hardware_id or hardware_id(uid_of(message.payload[_UID], uid2))
 
     def _parameter(self, message: Message) -> None:
         bytewise = self.vehicle.autopilot.sends_integers_bytewise and int(message["param_type"]) in _INTEGERS

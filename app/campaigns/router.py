@@ -2,10 +2,18 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Query, status
+from fastapi import APIRouter, Depends, Query, Response, status
 
 from app.accounts.permissions import Permission, is_allowed
-from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, vehicle_history
+from app.campaigns import (
+    figure_data,
+    flight_predictions,
+    landscapes,
+    parameter_files,
+    proposals,
+    service,
+    vehicle_history,
+)
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -39,6 +47,7 @@ from app.web.dependencies import (
     Theme,
     WantedPart,
     Writer,
+    described,
     json_only,
     of_app,
 )
@@ -120,6 +129,14 @@ def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id
     """Make the best gains the safe gains of the campaign's registered vehicle, once its flights have shown that they
     are better than the first ones."""
     return act(lambda session: service.promote_best(session, campaign_id, body, asking))
+
+
+@router.get("/{campaign_id}/parameter-file", response_class=Response, responses=described("text/plain", binary=False))
+def get_parameter_file(session: Reader, campaign_id: Id) -> Response:
+    """The best gains of a finished campaign as the vehicle's ground station or airframe takes them, with those of the
+    first flight as comments; 409 if none are better."""
+    name, content = parameter_files.parameter_file(session, campaign_id)
+    return Response(content, media_type="text/plain", headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
 
 @router.get("/{campaign_id}/statistics")

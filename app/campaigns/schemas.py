@@ -257,6 +257,10 @@ class Campaign(CampaignBrief):
             "at least twice, then confirmed if it is better"
         ),
     ]
+    parameter_file: Annotated[
+        str | None,
+        Field(description="name of the file with the best gains of a finished campaign; null if none are better"),
+    ]
     trials: TrialCounts
     flying: FlyingTrial | None
     actions: Annotated[list[str], Field(description="allowed actions: plan, define, finish, archive, …")]

@@ -7,6 +7,7 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
+from app.autopilots.registry import TUNED
 from app.campaigns import history, repository
 from app.campaigns.definitions import flown_evidence
 from app.campaigns.proposals import PROPOSAL_JOB, choices_of, is_stale
@@ -61,7 +62,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     flight = history.flight_under_way(session, row.id)
     now = flown_evidence(row, trials)
     repeatable = now.within_bounds
-    rehearsal = rehearsal_of(session, row)
+    rehearsal, standing = rehearsal_of(session, row), _standing(row, repeatable)
     return Campaign.view_of(
         row,
         vehicle=fleet.campaign_vehicle(row),
@@ -76,7 +77,8 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         )
         if repeatable.groups
         else None,
-        standing=_standing(row, repeatable),
+        standing=standing,
+        parameter_file=_parameter_file(row, standing),
         trials=_counts(trials),
         flying=None if flight is None else FlyingTrial(trial_id=flight.trial_id, trial_number=flight.trial.number),
         next_action=_next_action(row, trials, rehearsal),
@@ -215,6 +217,11 @@ def _standing(row: CampaignRow, now: Evidence[Experiment]) -> Standing | None:
     if not now.looks:
         return "candidate"
     return "confirmed" if now.comparison.verdict == "better" else "not confirmed"
+
+
+def _parameter_file(row: CampaignRow, standing: Standing | None) -> str | None:
+    is_better = standing in {"candidate", "confirmed"} and row.experiment in TUNED
+    return f"campaign-{row.id}{TUNED[row.experiment].parameter_file.suffix}" if is_better else None
 
 
 def _counts(trials: Sequence[TrialRow]) -> TrialCounts:

@@ -2,9 +2,11 @@
 
 from sqlalchemy.orm import Session
 
+from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import InputError, Problem
 from app.log_library import repository, stored_answers
-from app.log_library.library_schemas import LogComparison, ParameterChange
+from app.log_library.library_schemas import LogComparison
+from app.log_library.parameter_changes import parameter_changes
 from app.log_library.stored_logs import log_view
 
 
@@ -22,6 +24,13 @@ def compare(session: Session, log_id: int, before_id: int | None) -> LogComparis
             problems=(Problem("before", "is missing"),),
         )
     before = repository.log_with_answer(session, earlier)
+    if log.autopilot != before.autopilot:
+        raise InputError(
+            f"{log.file_name} is not compared with {before.file_name}: they are of different autopilots.",
+            hint=f"Choose another log under {log.autopilot}.",
+            problems=(Problem("before", f"was flown under {before.autopilot}"),),
+        )
+    autopilot = next(each for each in AUTOPILOTS.values() if each.title == log.autopilot)
     held = [stored_answers.unpack(each.answer).parameters for each in (before, log)]
     return LogComparison(
         log=log_view(log),
@@ -31,9 +40,5 @@ def compare(session: Session, log_id: int, before_id: int | None) -> LogComparis
         effect=None,
         sentence="",
         notes=[],
-        parameters=[
-            ParameterChange(name=name, group="other", before=held[0].get(name), after=held[1].get(name))
-            for name in sorted(held[0].keys() | held[1].keys())
-            if held[0].get(name) != held[1].get(name)
-        ],
+        parameters=parameter_changes(autopilot, *held),
     )

@@ -11,7 +11,7 @@ from app.autopilots.autopilot import Autopilot
 from app.autopilots.described import loop_of, signals_of
 from app.autopilots.frames import frame_of
 from app.autopilots.log_readers import Reader, reader_of
-from app.autopilots.recording import Recording
+from app.autopilots.recording import Recording, final_parameters
 from app.autopilots.replica_check import LoopReplica, ReplicaCheck
 from app.autopilots.replicas import REPLICAS, traced
 from app.autopilots.takeoffs import Takeoff
@@ -124,13 +124,21 @@ def analyze_content(
         replica=replica.answer,
         texts=Texts(tuning=tuning.texts, replica=replica.texts),
     )
-    return AnalysedContent(
+    found = AnalysedContent(
         answer=answer,
         plots={"tuning": tuning.plots, "replica": replica.plots},
         numbers=tuning.numbers,
-        flown_at=None if recording is None else recording.started_at,
         fit=tuning.fit,
         definition=tuning.definition,
+    )
+    if recording is None:
+        return found
+    return replace(
+        found,
+        hardware_id=recording.hardware_id,
+        vehicle_name=recording.vehicle_name,
+        flown_at=recording.started_at,
+        parameters=final_parameters(recording),
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field
 
@@ -14,6 +14,7 @@ from app.core.statistics.comparisons import Verdict
 from app.figures.base import Card
 from app.figures.panels import Plot
 from app.figures.theme import ThemeName
+from app.log_library.parameter_changes import ParameterChange
 from app.log_library.schemas import EstimatedValue, LogAnswer, Part
 
 
@@ -112,18 +113,6 @@ class LoggedVehicle(LoggedVehicleBrief):
     hardware_id: str | None
     logs: Annotated[int, Field(description="number of its logs")]
     newest: AnalysedLog
-
-
-class ParameterChange(Schema):
-    """A parameter that is not the same in two logs; null where a log does not tell it."""
-
-    name: str
-    group: Annotated[
-        Literal["gain", "loop", "other", "self-written"],
-        Field(description="gain to be tuned; what else the vertical loop depends on; other; written by the autopilot"),
-    ]
-    before: float | None
-    after: float | None
 
 
 class GainEffect(Schema):

@@ -48,11 +48,13 @@ def store(session: Session, found: AnalysedContent, digest: str, file_digest: st
     """Store an answer, in the place of an older one to the same log; returns its id. Deletes those that nobody kept."""
     now = utc_now()
     repository.delete_analysed_before(session, now - UNKEPT_FOR)
-    row = repository.of_digest_or_none(session, digest) or AnalysedLogRow(digest=digest, file_digest=file_digest)
+    row = repository.of_digest_or_none(session, digest) or AnalysedLogRow(
+        digest=digest, file_digest=file_digest, ordered_at=now
+    )
     row.file_name, row.autopilot = found.answer.file_name, found.answer.autopilot
     row.grade, row.program = found.answer.tuning.grade, __version__
     row.hardware_id, row.vehicle_name = found.hardware_id, found.vehicle_name
-    row.flown_at, row.analysed_at, row.ordered_at = found.flown_at, now, found.flown_at or row.ordered_at or now
+    row.flown_at, row.analysed_at, row.ordered_at = found.flown_at, now, found.flown_at or row.ordered_at
     row.numbers = found.numbers.model_dump(mode="json")
     row.fit = None if found.fit is None else asdict(found.fit)
     row.answer = stored_answers.pack(found)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Final
 
+from app.autopilots.registry import TUNED
 from app.autopilots.takeoffs import NOT_COMMANDED, Takeoff
 from app.core.analysis.analysis import Grade
 from app.core.errors import Problem, TrajectoryError
@@ -28,6 +29,7 @@ from app.log_library.schemas import (
 
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""
+_FORMAT: Final = TUNED[Experiment.name].parameter_file
 _SHOWN_S: Final = 8.0
 _POINTS: Final = 1500
 
@@ -103,18 +105,9 @@ def _airframe_section(analysis: TakeoffAnalysis, file_name: str) -> ParameterFil
     """The proposed gains as a section of an airframe file; None without a proposal."""
     if analysis.proposed is None:
         return None
-    flown = format_gains(analysis.assessments[0].gains)
-    named = file_name.replace("--", "-")
-    lines = [
-        f"<!-- Gainline, from {named}, flown with {flown}. Fly first with free space, ready to take over. -->",
-        '<section name="GUIDANCE_V" prefix="GUIDANCE_V_">',
-        *(
-            f'  <define name="HOVER_{name.upper()}" value="{value:g}"/>'
-            for name, value in analysis.proposed.gains.items()
-        ),
-        "</section>",
-    ]
-    return ParameterFile(name=f"{PurePath(file_name).stem}.xml", content="\n".join((*lines, "")))
+    heading = f"Gainline, from {file_name}. Fly first with free space, ready to take over."
+    content = _FORMAT.content(heading, analysis.assessments[0].gains, analysis.proposed.gains)
+    return ParameterFile(name=f"{PurePath(file_name).stem}{_FORMAT.suffix}", content=content)
 
 
 def _flight(analysis: TakeoffAnalysis) -> list[str]:

@@ -1,4 +1,4 @@
-"""Tables of PX4's logs (.ulg, "ULog"): the wanted topics, parameters and numbers about the log.
+"""Tables of PX4's logs (.ulg, "ULog"): the wanted topics, all parameters, and the wanted values about the log.
 
 The file is filtered first: only messages that are wanted, with flat and valid formats, are passed to pyulog. This
 bounds memory and time by the flight, whatever a file claims to contain.
@@ -26,21 +26,28 @@ _LARGEST_ARRAY: Final = 64
 _MAX_FIELDS: Final = 300
 _FIELD: Final = re.compile(r"(u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,3})\])? (\w+)")
 _APPENDED: Final = 0x01
-_VALUES: Final[Mapping[str, Mapping[str, int]]] = {"P": {"float": 4, "int32_t": 4}, "I": {"uint32_t": 4, "uint64_t": 8}}
-"""Types of parameters, and of the numbers about the log, with their bytes."""
+_TEXTS: Final = {f"char[{size}]": size for size in range(1, 65)}
+_VALUES: Final[Mapping[str, Mapping[str, int]]] = {
+    "P": {"float": 4, "int32_t": 4},
+    "I": {"uint32_t": 4, "uint64_t": 8, **_TEXTS},
+}
+"""Types of parameters, and of the values about the log, with their bytes."""
+_PARAMETER: Final = re.compile(r"[A-Z0-9_]{1,16}")
+_MOST_PARAMETERS: Final = 5_000
 
 HINT: Final = "Use PX4's .ulg log of the flight, with vehicle_local_position in it."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ULogTables:
-    """The lowest instance of each wanted topic; time, s, name and value of the wanted parameters in order of their
-    time, of which those from before the log are at −∞; the wanted numbers about the log, and remarks on what it lacks.
+    """The lowest instance of each wanted topic; time, s, name and value of the parameters in order of their time, of
+    which those from before the log are at −∞; the wanted numbers and texts about the log, and remarks on what it lacks.
     """
 
     topics: Mapping[str, Table]
     settings: Sequence[tuple[float, str, float]]
     information: Mapping[str, int]
+    texts: Mapping[str, str]
     notes: Sequence[str]
 
 
@@ -50,8 +57,8 @@ def is_ulog(head: bytes) -> bool:
 
 
 def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], values: Collection[str]) -> ULogTables:
-    """Read these topics, parameters and numbers about the log of a whole log. Raises TrajectoryError if it is not a
-    readable ULog."""
+    """Read all parameters, these topics and these `values` about the log, of a whole log. Raises TrajectoryError if it
+    is not a readable ULog."""
     from pyulog import ULog
     from pyulog.exceptions import ULogException
 
@@ -76,7 +83,8 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], values: Colle
     return ULogTables(
         topics=_lowest_instances(log.data_list),
         settings=tuple((at_s, name, float(value)) for at_s, name, value in settings if np.isfinite(value)),
-        information=log.msg_info_dict,
+        information={name: value for name, value in log.msg_info_dict.items() if isinstance(value, int)},
+        texts={name: value for name, value in log.msg_info_dict.items() if isinstance(value, str)},
         notes=notes,
     )
 
@@ -108,6 +116,7 @@ class _LogFilter:
     damages: int = 0
     unread_bytes: int = 0
     _formats: set[str] = field(default_factory=set)
+    _parameters: set[str] = field(default_factory=set)
     _subscribed: set[int] = field(default_factory=set)
     _appended: list[int] = field(default_factory=list)
 
@@ -143,7 +152,7 @@ class _LogFilter:
             case "A":
                 return self._subscribes(data[start:end])
             case "P" | "I" as letter:
-                return self._is_value(data[start:end], _VALUES[letter])
+                return self._is_value(data[start:end], letter)
             case "B":
                 self._flags(data[start:end])
         return False
@@ -185,7 +194,12 @@ class _LogFilter:
         offsets = [int.from_bytes(body[at : at + 8], "little") for at in (16, 24, 32)]
         self._appended = sorted(offset for offset in offsets if offset)
 
-    def _is_value(self, body: bytes, kinds: Mapping[str, int]) -> bool:
-        """Whether this is a wanted name in PX4's form, "float NAME" of one of these kinds, and its value."""
+    def _is_value(self, body: bytes, letter: str) -> bool:
+        """Whether this is a name in PX4's form, "float NAME", of a parameter or a wanted one, and its value."""
         kind, _, name = body[1 : 1 + body[0]].decode("ascii", "replace").partition(" ")
-        return name in self.values and len(body) - 1 - body[0] == kinds.get(kind)
+        value = body[1 + body[0] :]
+        if len(value) != _VALUES[letter].get(kind) or (kind in _TEXTS and not value.isascii()):
+            return False
+        if letter == "P" and _PARAMETER.fullmatch(name) and len(self._parameters) < _MOST_PARAMETERS:
+            self._parameters.add(name)
+        return name in (self._parameters if letter == "P" else self.values)

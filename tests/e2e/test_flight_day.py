@@ -261,6 +261,18 @@ def see_the_result(dashboard: Dashboard, campaign_id: int) -> None:
     assert measured is not None
     assert measured["y"] == pytest.approx(errors, abs=1e-6)
     picture(dashboard, "converged")
+    load(dashboard, campaign)
+
+
+def load(dashboard: Dashboard, campaign: Json) -> None:
+    """The file has the best gains; the vehicle, which holds its safe gains again, does not."""
+    kp = campaign["winner"]["gains"]["kp"]
+    row = dashboard.panel("Converged").get_by_role("row", name="kp")
+    expect(row).to_have_text(f"kp283{kp:g}differs: 283")
+    with dashboard.page.expect_download() as download:
+        dashboard.button("Download parameter file").click()
+    assert download.value.suggested_filename == campaign["parameter_file"] == f"campaign-{campaign['id']}.xml"
+    assert f'<define name="HOVER_KP" value="{kp:g}"/>' in download.value.path().read_text()
 
 
 def error_of_best_gains(dashboard: Dashboard, campaign_id: int) -> str:

@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator
 from app.log_library.schemas import LogAnswer
 
 DOCUMENTED: Final = Path(__file__).parents[2] / "docs" / "log-answer.schema.json"
-_MAY_HAVE_BLANKS: Final = frozenset({"file_name", "name", "title"})
+_MAY_HAVE_BLANKS: Final = frozenset({"file_name", "name", "suggested_name", "title", "vehicle_name"})
 
 
 def generated() -> dict[str, Any]:

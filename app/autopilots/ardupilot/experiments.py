@@ -31,6 +31,7 @@ from app.autopilots.ardupilot.replica.parameters import (
 )
 from app.autopilots.ardupilot.replica.replay import climb_rate_targets
 from app.autopilots.copter_loop import CopterLoop
+from app.autopilots.parameter_file import NAMES_AND_VALUES
 from app.core.analysis.loop import GainSpace, LoggedFlight, LoopTexts, Run, mean_over, transition_of
 from app.core.analysis.recorded_flight import FlownSteps, require_channels, segment_of, unanswered, whole_steps
 from app.core.analysis.segment import LEAD_S, Segment, Steps
@@ -113,7 +114,7 @@ class ArduPilotLoop(CopterLoop):
             "5 s, climb 2 m, hover for 5 s, descend 2 m, hover for 5 s; with NTUN and CTUN in LOG_BITMASK."
         ),
         lags="motors, accelerometer filter, acceleration controller filters",
-        parameter_suffix=".param",
+        parameter_suffix=NAMES_AND_VALUES.suffix,
     )
     space = GainSpace(
         bounds=MappingProxyType(
@@ -158,11 +159,7 @@ class ArduPilotLoop(CopterLoop):
         return {name: {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": p, "PSC_ACCZ_I": i}}
 
     def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
-        """As Mission Planner and MAVProxy load them."""
-        return [
-            *(f"# {name} was {value:g}" for name, value in flown.items()),
-            *(f"{name},{value:g}" for name, value in proposed.items()),
-        ]
+        return NAMES_AND_VALUES.changes(flown, proposed)
 
     def climb_rate_targets(self, segment: Segment) -> Samples:
         """A reference at rest has no desired climb rate, even where that was not logged."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.ardupilot.replica.parameters import in_older_names
+from app.autopilots.mavlink import UID2_BYTES, hardware_id
 from app.autopilots.recording import (
     COMMANDS,
     Column,
@@ -110,6 +111,8 @@ _BANNER: Final = re.compile(
     rb"(APM:Copter|ArduCopter|ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V(\d[\w.-]*)"
 )
 _FRAME: Final = re.compile(rb"Frame: ([\w/-]+)")
+_BOARD: Final = re.compile(rb"(?i)[^ ].* ([\da-f]{8}) ([\da-f]{8}) ([\da-f]{8})\s*$")
+"""The board's name and the words of its id; in a simulation there is one word of another form."""
 _WEEK_S: Final = 604_800.0
 _GPS_BEGAN_S: Final = datetime(1980, 1, 6, tzinfo=UTC).timestamp() - 18.0
 """Less the leap seconds since then."""
@@ -136,6 +139,7 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
         firmware="" if firmware in _COPTERS else firmware,
         release=release,
         frame=_in_messages(tables, _FRAME)[0],
+        hardware_id=_hardware_id(_in_messages(tables, _BOARD)),
         columns=columns,
         sources=list(log.tables),
         settings=[Setting(*each) for each in parameters_in(tables) if np.isfinite(each[2])],
@@ -143,6 +147,12 @@ def read_ardupilot(stream: BinaryIO) -> Recording:
         notes=[*restarts(len(log.boots_s)), *left_out(log.skipped_bytes, log.odd_rows)],
         started_at=None if log.boots_s else date_of(_booted_s(tables)),
     )
+
+
+def _hardware_id(words: Sequence[str]) -> str:
+    """The board's id from its words, each of which is printed with the last byte first; as long as in MAVLink 2."""
+    serial = b"".join(bytes.fromhex(each)[::-1] for each in words)
+    return hardware_id(serial.ljust(UID2_BYTES, b"\0").hex())
 
 
 def _booted_s(tables: Mapping[str, Table]) -> float:

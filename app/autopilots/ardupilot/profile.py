@@ -5,7 +5,13 @@ from typing import Final
 
 from app.autopilots import commands, mavlink
 from app.autopilots.ardupilot.experiments import EXPERIMENTS, GAINS
-from app.autopilots.ardupilot.replica.parameters import LOOP_NAMES, NEWER_NAMES, SINCE_4_7, UNSUPPORTED
+from app.autopilots.ardupilot.replica.parameters import (
+    LOOP_NAMES,
+    NEWER_NAMES,
+    SINCE_4_7,
+    UNSUPPORTED,
+    in_names_of,
+)
 from app.autopilots.autopilot import Autopilot, Requirement, on_board
 from app.autopilots.commands import Action, Setting, Step, Target
 from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, number
@@ -23,6 +29,23 @@ _MODE_NAMES: Final = MappingProxyType(
         "23": "Follow", "24": "ZigZag", "25": "SystemID", "26": "Autorotate", "27": "Auto RTL", "28": "Turtle",
     }
 )  # fmt: skip
+_TERMS: Final = ("P", "I", "D", "FF", "D_FF")
+_FURTHER_GAINS: Final = (
+    *("PSC_POSXY_P", "PSC_NE_POS_P"),
+    *(f"PSC_{loop}_{term}" for loop in ("VELXY", "NE_VEL", "VELZ", "D_VEL", "ACCZ", "D_ACC") for term in _TERMS),
+    *(f"ATC_ANG_{axis}_P" for axis in ("RLL", "PIT", "YAW")),
+    *(f"ATC_RAT_{axis}_{term}" for axis in ("RLL", "PIT", "YAW") for term in _TERMS),
+)
+_SELF_WRITTEN: Final = "|".join(
+    (
+        r"STAT_\w+",  # times of flight and boots
+        r"(BARO\d*|GND)_(GND_PRESS|ABS_PRESS|TEMP)",  # measured at every start
+        r"INS_GYR\d?_?OFFS_[XYZ]",  # measured at every start
+        r"INS_GYR\d?_CALTEMP",
+        r"COMPASS_DEC",  # from the position
+        r"(MIS|FENCE|RALLY)_TOTAL",  # of what was loaded
+    )
+)
 _INTEGRATING: Final = "PSC_ACCZ_I"
 _LATER: Final = frozenset({*UNSUPPORTED, "PSC_ACCZ_D_FF", "TKOFF_SLEW_TIME", "TKOFF_THR_MAX"})
 """Parameters that were added after the first releases with these gains."""
@@ -61,6 +84,9 @@ ARDUPILOT: Final = Autopilot(
         on_board(GAINS, integrating=_INTEGRATING, names=SINCE_4_7),
     ),
     loop_parameters=(LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in SINCE_4_7), *NEWER_NAMES)),
+    further_gains=_FURTHER_GAINS,
+    self_written=_SELF_WRITTEN,
+    in_names_of=in_names_of,
     may_lack=_MAY_LACK,
     requirements=(
         Requirement("FS_GCS_ENABLE", "5 (land when the ground station is lost)", frozenset({5.0})),

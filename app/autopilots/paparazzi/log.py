@@ -29,6 +29,7 @@ MAX_COMPANION_BYTES: Final = 16 * 2**20
 _GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
 _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
 _SETTINGS: Final = 256
+_LONGEST_NAME: Final = 60
 _MOST_CANDIDATES: Final = 32
 _PLATEAU_S: Final = 2.0
 _MAX_SAMPLES: Final = 2_000_000
@@ -67,6 +68,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Papar
         title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
         autopilot=PAPARAZZI,
         clock="ground",
+        vehicle_name=configuration.name,
         columns=_columns(lines, loop),
         settings=list(configuration.settings(flown)),
         events=[] if loop is None else list(_events(loop)),
@@ -183,6 +185,7 @@ class _Configuration:
     known: dict[str, list[tuple[float, float]]] = field(default_factory=lambda: {gain: [] for gain in GAINS})
     is_certain: bool = True
     is_described: bool = True
+    name: str = ""
     _is_mine: bool = False
     _groups: list[list[str]] = field(default_factory=lambda: [[]])
     _generated: list[str] | None = None
@@ -259,6 +262,8 @@ class _Configuration:
         elif kind == "aircraft":
             self._is_mine = given.get("ac_id") == self.aircraft
             self.is_described |= self._is_mine
+            if self._is_mine:
+                self.name = f"{given.get('name', '')[:_LONGEST_NAME]} ({self.aircraft})".strip()
         elif not self._is_mine:
             return
         elif kind == "generated_settings":

@@ -11,6 +11,7 @@ from app.autopilots.commands import Action, Ask, Outgoing, Step, Target
 from app.autopilots.dialects import PAPARAZZI as DIALECT
 from app.autopilots.dialects import Message, number, text
 from app.autopilots.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
+from app.autopilots.paparazzi.parameter_file import PARAMETER_FILE
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.takeoff import Takeoff
 
@@ -175,6 +176,7 @@ PAPARAZZI: Final = Autopilot(
             GainParameter("kd", "gui_v_kd", 0.0, 800.0, whole=True),
         ),
     ),
+    parameter_file=PARAMETER_FILE,
     logs_own_names=True,
     parameter_component=_ALL_COMPONENTS,
     stop_settings=_STOP_SETTINGS,
@@ -189,6 +191,7 @@ PAPARAZZI: Final = Autopilot(
         "SCRIPT_CURRENT": lambda message: BlockEntered(int(number(message, "seq"))),
         "AUTOPILOT_VERSION": _version,
     },
+    sends_hardware_id=False,
     reports_version=False,
     steps=_steps,
     holds_first=False,

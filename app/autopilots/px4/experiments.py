@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.autopilots.copter_loop import CopterLoop
+from app.autopilots.px4.parameter_file import PARAMETER_FILE
 from app.autopilots.px4.replica import vertical
 from app.autopilots.px4.replica.hover_range import (
     HOVER_RANGE,
@@ -79,7 +80,6 @@ SLOW_HZ: Final = 2.0
 
 _USUAL: Final = Copter(hover_throttle=0.5, thrust_slope=1.25, motor_lag_s=0.05, drag_1_s=0.3)
 _THROTTLE, _SLOW = FLOWN.index("throttle"), FLOWN.index("throttle_slow")
-_REAL32: Final = 9
 _AT_LIMIT: Final = 1e-4
 
 
@@ -114,7 +114,7 @@ class Px4Loop(CopterLoop):
             "SDLOG_PROFILE set, its default. In a takeoff the ramp decides, not the gains."
         ),
         lags="motors, filters of the velocity (MPC_VEL_LP, MPC_VELD_LP)",
-        parameter_suffix=".params",
+        parameter_suffix=PARAMETER_FILE.suffix,
         hover_deviation=HOVER_RANGE_NAME,
     )
     space = GainSpace(
@@ -159,12 +159,7 @@ class Px4Loop(CopterLoop):
         return self.accelerometer
 
     def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
-        """As QGroundControl loads them: vehicle, component, name, value and MAVLink type, separated by tabs."""
-        return [
-            *(f"# {name} was {value:g}" for name, value in flown.items()),
-            "# Vehicle-Id Component-Id Name Value Type",
-            *(f"{self.vehicle}\t1\t{name}\t{value:g}\t{_REAL32}" for name, value in proposed.items()),
-        ]
+        return PARAMETER_FILE.changes(flown, proposed, self.vehicle)
 
     def climb_rate_targets(self, segment: Segment) -> Samples:
         p = self.parameters

@@ -6,8 +6,8 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.mavlink import hardware_id
 from app.autopilots.px4.profile import PX4
-from app.autopilots.px4.replica.parameters import LOOP_NAMES, THRUST_GAINS
 from app.autopilots.recording import (
     COMMANDS,
     Column,
@@ -89,7 +89,7 @@ AIRFRAMES: Final[Mapping[str, Mapping[str, range]]] = {
 }  # fmt: skip
 """Kinds of vehicles that are no copter with several rotors, by the values of parameters."""
 
-_RELEASE, _BOOT_DATE, _GPS = "ver_sw_release", "boot_time_utc_us", "vehicle_gps_position"
+_RELEASE, _BOOT_DATE, _BOARD, _GPS = "ver_sw_release", "boot_time_utc_us", "sys_uuid", "vehicle_gps_position"
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = (5.0, 12.0, 18.0, 20.0)
@@ -103,8 +103,7 @@ _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position",
 def read_px4(stream: BinaryIO) -> Recording:
     """Decode a whole log. Raises TrajectoryError if it is not a readable ULog."""
     wanted = {_COMMAND, _ANSWER, _GPS, *(source.message for source in (*SOURCES.values(), *_OLDER_SOURCES.values()))}
-    values = {*LOOP_NAMES, *THRUST_GAINS.values(), VEHICLE, *AIRFRAMES, _RELEASE, _BOOT_DATE}
-    tables = read_ulog_tables(stream, topics=wanted, values=values)
+    tables = read_ulog_tables(stream, topics=wanted, values={_RELEASE, _BOOT_DATE, _BOARD})
     columns = columns_of(tables.topics, _OLDER_SOURCES, clock="timestamp")
     columns |= columns_of(tables.topics, SOURCES, clock="timestamp")
     arming = columns.get("arming_state")
@@ -112,6 +111,7 @@ def read_px4(stream: BinaryIO) -> Recording:
         title="PX4's log (ULog)",
         autopilot=PX4,
         release=release_of(tables.information.get(_RELEASE, 0)),
+        hardware_id=hardware_id(tables.texts.get(_BOARD, "")),
         columns=columns,
         sources=[topic for topic, table in tables.topics.items() if len(table.get("timestamp", ()))],
         settings=[Setting(*each) for each in tables.settings],

@@ -12,8 +12,9 @@ from app.autopilots.dialects import COMMON, Message, number
 from app.autopilots.measurements import Measurement, Parameter, VehicleEvent
 from app.autopilots.px4.arming_checks import HEALTH_SUMMARY, Px4ArmingChecks
 from app.autopilots.px4.experiments import EXPERIMENTS, GAINS
+from app.autopilots.px4.parameter_file import PARAMETER_FILE
 from app.autopilots.px4.replica.hover_range import HOVER_RANGE_NAME, HOVER_THRUSTS, hover_deviation, hover_limits
-from app.autopilots.px4.replica.parameters import ESTIMATOR_NAMES, LOOP_NAMES, UNSUPPORTED
+from app.autopilots.px4.replica.parameters import ESTIMATOR_NAMES, LOOP_NAMES, THRUST_GAINS, UNSUPPORTED
 from app.core.errors import InputError
 
 _HOVER: Final = "MPC_THR_HOVER"
@@ -34,6 +35,20 @@ _MODE_NAMES: Final = MappingProxyType(
     }
 )  # fmt: skip
 _INT32: Final = 6
+_FURTHER_GAINS: Final = (
+    *THRUST_GAINS.values(),
+    "MPC_XY_P",
+    *(f"MPC_XY_VEL_{term}{form}" for form in ("_ACC", "") for term in "PID"),
+    *(f"MC_{axis}_P" for axis in ("ROLL", "PITCH", "YAW")),
+    *(f"MC_{axis}RATE_{term}" for axis in ("ROLL", "PITCH", "YAW") for term in ("K", "P", "I", "D", "FF")),
+)
+_SELF_WRITTEN: Final = "|".join(
+    (
+        r"COM_FLIGHT_UUID|LND_FLIGHT_T_(HI|LO)",  # number and time of its flights
+        r"CAL_GYRO\d_[XYZ]OFF",  # measured at the start and on the ground
+        r"CAL_MAG\d_[XYZ]OFF|EKF2_MAGBIAS_[XYZ]",  # estimated in flight
+    )
+)
 _STREAMED_FOR_S: Final = 1.2
 """It accepts the offboard mode once set points have arrived for a second."""
 
@@ -101,6 +116,9 @@ PX4: Final = Autopilot(
     gain_sets=(on_board(GAINS, integrating="MPC_Z_VEL_I_ACC"),),
     sends_integers_bytewise=True,
     loop_parameters=(LOOP_NAMES,),
+    parameter_file=PARAMETER_FILE,
+    further_gains=_FURTHER_GAINS,
+    self_written=_SELF_WRITTEN,
     may_lack=frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME}),
     hover_limits=_hover_limits,
     requirements=(

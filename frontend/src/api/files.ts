@@ -6,7 +6,7 @@ import { randomKey } from "./client";
 import { ApiError, problemFrom } from "./problems";
 import type { Campaign } from "./types";
 
-export function pathOf(campaignId: number, file: "report.html" | "report.pdf" | "bundle"): string {
+export function pathOf(campaignId: number, file: "report.html" | "report.pdf" | "bundle" | "parameter-file"): string {
   return `/api/campaigns/${campaignId}/${file}`;
 }
 

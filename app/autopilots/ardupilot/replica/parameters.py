@@ -149,6 +149,13 @@ def in_newer_names(values: Mapping[str, float], names: Mapping[str, tuple[str, f
     return {name: _scaled(value, factor) for name, factor, value in renamed}
 
 
+def in_names_of(values: Mapping[str, float], own: Collection[str]) -> dict[str, float]:
+    """Parameters of any release by the names and in the units of a vehicle whose parameters have its `own` names;
+    unchanged if it has the name, or the parameter was not renamed."""
+    older = dict(in_older_names(*each) for each in values.items() if each[0] not in own)
+    return {**in_newer_names(older, names_of(own)), **{name: values[name] for name in values.keys() & own}}
+
+
 def _scaled(value: float, factor: float) -> float:
     return value if factor == 1.0 else float(f"{value * factor:.{_SINGLE_PRECISION_DIGITS}g}")
 

@@ -376,6 +376,12 @@ export type Campaign = {
      * of the winner of a finished campaign: candidate until it and the first gains were flown at least twice, then confirmed if it is better
      */
     standing: 'candidate' | 'confirmed' | 'not confirmed' | null;
+    /**
+     * Parameter File
+     *
+     * name of the file with the best gains of a finished campaign; null if none are better
+     */
+    parameter_file: string | null;
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
@@ -3332,19 +3338,13 @@ export type PageVehicle = {
 /**
  * ParameterChange
  *
- * A parameter that is not the same in two logs; null where a log does not tell it.
+ * A parameter by the name and in the unit of the newer log, and its values; None where a log lacks it.
  */
 export type ParameterChange = {
     /**
      * Name
      */
     name: string;
-    /**
-     * Group
-     *
-     * gain to be tuned; what else the vertical loop depends on; other; written by the autopilot
-     */
-    group: 'gain' | 'loop' | 'other' | 'self-written';
     /**
      * Before
      */
@@ -3353,6 +3353,7 @@ export type ParameterChange = {
      * After
      */
     after: number | null;
+    group: ParameterGroup;
 };
 
 /**
@@ -3370,6 +3371,14 @@ export type ParameterFile = {
      */
     content: string;
 };
+
+/**
+ * ParameterGroup
+ *
+ * Gains, further parameters of the altitude loop, all others, those that the autopilot writes by itself, and those
+ * that one log lacks: whether they changed is unknown. In the order in which they are listed.
+ */
+export type ParameterGroup = 'gain' | 'loop' | 'other' | 'self-written' | 'unknown';
 
 /**
  * PartTexts
@@ -5954,6 +5963,36 @@ export type PromoteBestResponses = {
 };
 
 export type PromoteBestResponse = PromoteBestResponses[keyof PromoteBestResponses];
+
+export type GetParameterFileData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/parameter-file';
+};
+
+export type GetParameterFileErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetParameterFileError = GetParameterFileErrors[keyof GetParameterFileErrors];
+
+export type GetParameterFileResponses = {
+    /**
+     * Successful Response
+     */
+    200: string;
+};
+
+export type GetParameterFileResponse = GetParameterFileResponses[keyof GetParameterFileResponses];
 
 export type GetStatisticsData = {
     body?: never;

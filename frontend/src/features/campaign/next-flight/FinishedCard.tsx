@@ -17,6 +17,7 @@ import { CloneForm } from "../../new-campaign/CloneForm";
 import { ArchiveCampaign } from "../EndCampaign";
 import { PromoteGains } from "../verdict/PromoteGains";
 import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
+import { LoadGains } from "./LoadGains";
 
 const FURTHER_FLIGHTS = 3;
 
@@ -82,6 +83,9 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
           <Button variant="default" onClick={() => onChoose(bestFlight)}>
             Show flight {bestFlight}
           </Button>
+        )}
+        {campaign.parameter_file !== null && winner !== undefined && first !== undefined && (
+          <LoadGains campaign={campaign} best={winner.gains} first={first.gains} />
         )}
         <PromoteGains campaign={campaign} />
         <Note fz="body">A clone is a new campaign with the same settings.</Note>

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { confirmationOf, confirmationText, endingOf } from "./finishedCampaign";
+import { confirmationOf, confirmationText, endingOf, gainsToLoad } from "./finishedCampaign";
 
 test("a candidate is confirmed by the flights that it lacks", () => {
   const flown = (times: number) => ({ errors: Array<number>(times).fill(0.2) });
@@ -17,4 +17,15 @@ test("why a campaign ended is said without the verdict that stands beside it", (
     "All 7 flights of the budget have been flown.",
   );
   expect(endingOf({ stop_reason: reason }, null)).toBe(reason);
+});
+
+test("gains are on the vehicle if it holds what the file says, which has six digits", () => {
+  const best = { kp: 0.123456789, ki: 0, kd: 82 };
+  const found = gainsToLoad(best, { kp: 0.1, ki: 0 }, { kp: 0.123457, ki: 0, kd: 83 });
+  expect(found).toEqual([
+    { name: "kp", old: 0.1, value: 0.123456789, held: 0.123457, isOnVehicle: true },
+    { name: "ki", old: 0, value: 0, held: 0, isOnVehicle: true },
+    { name: "kd", old: undefined, value: 82, held: 83, isOnVehicle: false },
+  ]);
+  expect(gainsToLoad(best, {}, {}).some(({ isOnVehicle }) => isOnVehicle)).toBe(false);
 });

@@ -1,8 +1,9 @@
-/** Why a campaign ended, and the flights that would confirm its result. */
+/** Why a campaign ended, the flights that would confirm its result, and its gains on the vehicle. */
 
 import type { Campaign, CampaignStatistics, RepeatGroup } from "../../../api/types";
 import { count } from "../../../ui/format";
 
+type Gains = Readonly<Record<string, number>>;
 type Repeated = Pick<RepeatGroup, "errors"> | undefined;
 type Variant = "repeat" | "baseline";
 
@@ -29,4 +30,25 @@ export function endingOf(
   comparison: Pick<NonNullable<CampaignStatistics["comparison"]>, "sentence"> | null,
 ): string {
   return comparison === null ? reason : reason.replace(comparison.sentence, "").replaceAll("  ", " ").trim();
+}
+
+/** A gain to load: the first flight's value, the new one, and that on the vehicle, undefined if it is not known. */
+export interface GainToLoad {
+  name: string;
+  old: number | undefined;
+  value: number;
+  held: number | undefined;
+  isOnVehicle: boolean;
+}
+
+/** A parameter file has six digits. */
+const FILE_PRECISION = 1e-5;
+
+/** The best gains beside the first flight's and those that the vehicle holds. */
+export function gainsToLoad(best: Gains, first: Gains, held: Gains): GainToLoad[] {
+  return Object.entries(best).map(([name, value]) => {
+    const onBoard = held[name];
+    const isOnVehicle = onBoard !== undefined && Math.abs(onBoard - value) <= FILE_PRECISION * Math.abs(value);
+    return { name, old: first[name], value, held: onBoard, isOnVehicle };
+  });
 }
