@@ -115,7 +115,7 @@ def ardupilot_flight(recording: Recording, name: str) -> LoggedFlight:
     loop = replace(ardupilot_loop_of(recording, {**given, _LEARNED: hover}), row_s=None)
     segments = [rows.part(thinned(time_s, part)) for part in chosen]
     if "desired_climb_rate_m_s" not in recording.columns:
-        segments = [_TuningSegment.of(each, loop) for each in segments]
+        segments = [TuningSegment.of(each, loop) for each in segments]
     return LoggedFlight(loop=loop, segments=segments)
 
 
@@ -128,7 +128,7 @@ def ardupilot_loop_of(recording: Recording, given: Mapping[str, float]) -> ArduP
     return replace(loop, names=names_of({each.name for each in recording.settings}), differentiates=differentiates)
 
 
-class _TuningSegment(Segment):
+class TuningSegment(Segment):
     """A segment of CTUN, which has no desired climb rate: what of its target does not come from the deviation. With
     some releases and modes the altitude of the reference changes without one, and the climb rate has a bias."""
 
@@ -141,7 +141,7 @@ class _TuningSegment(Segment):
         return self.v_m_s - np.mean(self.v_m_s - np.gradient(self.z_m, self.time_s))
 
     @classmethod
-    def of(cls, rows: Segment, loop: ArduPilotLoop) -> "_TuningSegment":
+    def of(cls, rows: Segment, loop: ArduPilotLoop) -> "TuningSegment":
         """The rows under this loop."""
         from_deviation = climb_rate_targets(loop.parameters, rows.z_d_m - rows.z_m, np.zeros_like(rows.z_m))
         v_d_m_s = rows.v_t_m_s - from_deviation
