@@ -27,6 +27,7 @@ from app.core.reasons import UNNAMED_FRAME, ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
 from app.log_library import descriptions, manoeuvres, replicas, takeoffs
+from app.log_library.flights import pack_flight
 from app.log_library.library_schemas import LogNumbers
 from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
 from app.logs.base import HEAD_BYTES
@@ -81,6 +82,7 @@ class AnalysedContent:
     flown_at: datetime | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     fit: LogFit | None = None
+    flight: bytes | None = None
     definition: Definition | None = None
 
 
@@ -129,6 +131,7 @@ def analyze_content(
         plots={"tuning": tuning.plots, "replica": replica.plots},
         numbers=tuning.numbers,
         fit=tuning.fit,
+        flight=tuning.flight,
         definition=tuning.definition,
     )
     if recording is None:
@@ -151,6 +154,7 @@ class _Answered(Generic[_Answer]):
     plots: list[Plot] = field(default_factory=list)
     numbers: LogNumbers = field(default_factory=LogNumbers)
     fit: LogFit | None = None
+    flight: bytes | None = None
     definition: Definition | None = None
 
 
@@ -187,6 +191,7 @@ def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[T
             [manoeuvres.plot_of(flight)],
             numbers=manoeuvres.listed_numbers(flight),
             fit=log_fit(flight.estimate, flight.loop),
+            flight=pack_flight(flown, flight.estimate.draws),
             definition=manoeuvres.start_of(flight, name) if answer.starts_campaign else None,
         )
     takeoff = analyze_takeoffs(takeoffs.logged_takeoffs(flown, name=name))

@@ -57,7 +57,7 @@ def store(session: Session, found: AnalysedContent, digest: str, file_digest: st
     row.flown_at, row.analysed_at, row.ordered_at = found.flown_at, now, found.flown_at or row.ordered_at
     row.numbers = found.numbers.model_dump(mode="json")
     row.fit = None if found.fit is None else asdict(found.fit)
-    row.answer = stored_answers.pack(found)
+    row.answer, row.flight = stored_answers.pack(found), found.flight
     return added(session, row).id
 
 
