@@ -5,15 +5,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, Response, status
 
 from app.accounts.permissions import Permission, is_allowed
-from app.campaigns import (
-    figure_data,
-    flight_predictions,
-    landscapes,
-    parameter_files,
-    proposals,
-    service,
-    vehicle_history,
-)
+from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, vehicle_history
+from app.campaigns.parameter_files import parameter_file
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -135,8 +128,9 @@ def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id
 def get_parameter_file(session: Reader, campaign_id: Id) -> Response:
     """The best gains of a finished campaign as the vehicle's ground station or airframe takes them, with those of the
     first flight as comments; 409 if none are better."""
-    name, content = parameter_files.parameter_file(session, campaign_id)
-    return Response(content, media_type="text/plain", headers={"Content-Disposition": f'attachment; filename="{name}"'})
+    name, content = parameter_file(session, campaign_id)
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(content, media_type="text/plain", headers=headers)
 
 
 @router.get("/{campaign_id}/statistics")

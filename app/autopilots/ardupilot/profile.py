@@ -5,13 +5,7 @@ from typing import Final
 
 from app.autopilots import commands, mavlink
 from app.autopilots.ardupilot.experiments import EXPERIMENTS, GAINS
-from app.autopilots.ardupilot.replica.parameters import (
-    LOOP_NAMES,
-    NEWER_NAMES,
-    SINCE_4_7,
-    UNSUPPORTED,
-    in_names_of,
-)
+from app.autopilots.ardupilot.replica.parameters import LOOP_NAMES, NEWER_NAMES, SINCE_4_7, UNSUPPORTED, in_names_of
 from app.autopilots.autopilot import Autopilot, Requirement, on_board
 from app.autopilots.commands import Action, Setting, Step, Target
 from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, number
@@ -30,22 +24,18 @@ _MODE_NAMES: Final = MappingProxyType(
     }
 )  # fmt: skip
 _TERMS: Final = ("P", "I", "D", "FF", "D_FF")
+_AXES: Final = ("RLL", "PIT", "YAW")
 _FURTHER_GAINS: Final = (
     *("PSC_POSXY_P", "PSC_NE_POS_P"),
     *(f"PSC_{loop}_{term}" for loop in ("VELXY", "NE_VEL", "VELZ", "D_VEL", "ACCZ", "D_ACC") for term in _TERMS),
-    *(f"ATC_ANG_{axis}_P" for axis in ("RLL", "PIT", "YAW")),
-    *(f"ATC_RAT_{axis}_{term}" for axis in ("RLL", "PIT", "YAW") for term in _TERMS),
+    *(f"ATC_ANG_{axis}_P" for axis in _AXES),
+    *(f"ATC_RAT_{axis}_{term}" for axis in _AXES for term in _TERMS),
 )
-_SELF_WRITTEN: Final = "|".join(
-    (
-        r"STAT_\w+",  # times of flight and boots
-        r"(BARO\d*|GND)_(GND_PRESS|ABS_PRESS|TEMP)",  # measured at every start
-        r"INS_GYR\d?_?OFFS_[XYZ]",  # measured at every start
-        r"INS_GYR\d?_CALTEMP",
-        r"COMPASS_DEC",  # from the position
-        r"(MIS|FENCE|RALLY)_TOTAL",  # of what was loaded
-    )
+_SELF_WRITTEN: Final = (
+    r"STAT_\w+|(MIS|FENCE|RALLY)_TOTAL|COMPASS_DEC"
+    r"|(BARO\d*|GND)_(GND_PRESS|ABS_PRESS|TEMP)|INS_GYR\d?_?OFFS_[XYZ]|INS_GYR\d?_CALTEMP"
 )
+"""Times of flight and boots, counts of what was loaded, what follows from the position; measured at every start."""
 _INTEGRATING: Final = "PSC_ACCZ_I"
 _LATER: Final = frozenset({*UNSUPPORTED, "PSC_ACCZ_D_FF", "TKOFF_SLEW_TIME", "TKOFF_THR_MAX"})
 """Parameters that were added after the first releases with these gains."""

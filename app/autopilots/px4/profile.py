@@ -42,13 +42,8 @@ _FURTHER_GAINS: Final = (
     *(f"MC_{axis}_P" for axis in ("ROLL", "PITCH", "YAW")),
     *(f"MC_{axis}RATE_{term}" for axis in ("ROLL", "PITCH", "YAW") for term in ("K", "P", "I", "D", "FF")),
 )
-_SELF_WRITTEN: Final = "|".join(
-    (
-        r"COM_FLIGHT_UUID|LND_FLIGHT_T_(HI|LO)",  # number and time of its flights
-        r"CAL_GYRO\d_[XYZ]OFF",  # measured at the start and on the ground
-        r"CAL_MAG\d_[XYZ]OFF|EKF2_MAGBIAS_[XYZ]",  # estimated in flight
-    )
-)
+_SELF_WRITTEN: Final = r"COM_FLIGHT_UUID|LND_FLIGHT_T_(HI|LO)|CAL_GYRO\d_[XYZ]OFF|CAL_MAG\d_[XYZ]OFF|EKF2_MAGBIAS_[XYZ]"
+"""Number and time of its flights, what it measures on the ground, and what it estimates in flight."""
 _STREAMED_FOR_S: Final = 1.2
 """It accepts the offboard mode once set points have arrived for a second."""
 
