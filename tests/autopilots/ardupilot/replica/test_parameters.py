@@ -4,6 +4,7 @@ import pytest
 
 from app.autopilots.ardupilot.replica.parameters import (
     Parameters,
+    in_names_of,
     in_newer_names,
     in_older_names,
     low_pass_gain,
@@ -63,6 +64,15 @@ def test_gains_are_written_by_the_names_that_the_vehicle_has() -> None:
     assert in_newer_names(gains, names_of(["POS_Z_P", "ACCEL_Z_P", "FRAME"])) == {"POS_Z_P": 3.0, "ACCEL_Z_P": 0.854}
     assert in_newer_names(gains, names_of(["PSC_POSZ_P", "PSC_ACCZ_P", "PSC_ACCZ_FILT"])) == gains
     assert in_newer_names(gains, names_of(["PSC_D_POS_P"])) == in_newer_names(gains)
+
+
+def test_parameters_of_another_release_get_the_names_and_units_of_the_vehicle() -> None:
+    of_4_7 = {"PSC_D_ACC_P": 0.05, "PSC_JERK_D": 5.0, "SCHED_LOOP_RATE": 400.0}
+    of_4_6 = {"PSC_ACCZ_P": 0.5, "PSC_JERK_Z": 5.0, "SCHED_LOOP_RATE": 400.0}
+    assert in_names_of(of_4_6, of_4_7.keys()) == of_4_7
+    assert in_names_of(of_4_7, of_4_6.keys()) == of_4_6
+    assert in_names_of(of_4_7, of_4_7.keys()) == of_4_7
+    assert in_names_of({"POS_Z_P": 1.0}, ()) == {"PSC_POSZ_P": 1.0}
 
 
 def test_gains_are_written_by_the_names_and_in_the_units_of_release_4_7() -> None:
