@@ -30,7 +30,7 @@ from app.processes.calls import FILE, run_limited
 if TYPE_CHECKING:
     from app.log_library.content import AnalysedContent
 
-EXAMPLE: Final = Path(__file__).parent / "data" / "arducopter_steps.bin.gz"
+EXAMPLE: Final = Path(__file__).parent / "data" / "altitude_steps.bin.gz"
 UNNAMED: Final = "Log"
 _FURTHER_FLIGHTS: Final = 6
 _ANY_RECORD: Final = Accepted(confirm=True, invalid=True)

@@ -57,9 +57,9 @@ def trend_plot(name: str, logs: Sequence[LogNumbers]) -> Plot:
     """A panel for each quantity that a log tells."""
     panels = []
     for title, digits, value_of in _QUANTITIES:
-        told = {float(place): value for place, log in enumerate(logs, 1) if (value := value_of(log)) is not None}
-        line = Line(name=title, style="measured", x=tuple(told), y=tuple(told.values()), marks=True)
-        panels += [Panel(y_title=title, digits=digits, lines=(line,))] * bool(told)
+        known = {float(place): value for place, log in enumerate(logs, 1) if (value := value_of(log)) is not None}
+        line = Line(name=title, style="measured", x=tuple(known), y=tuple(known.values()), marks=True)
+        panels += [Panel(y_title=title, digits=digits, lines=(line,))] * bool(known)
     return Plot(
         title=f"Trend of {name}",
         summary=f"Hover throttle, mean deviation, throttle activity and margin in {count(len(logs), 'log')}.",

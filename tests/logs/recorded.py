@@ -24,8 +24,11 @@ def recorded(name: str) -> bytes:
     """The content of a recorded log, uncompressed."""
     if (path := LOGS / name).exists():
         return path.read_bytes()
-    packed = next(folder / f"{name}.gz" for folder in (LOGS, EXAMPLE.parent) if (folder / f"{name}.gz").exists())
-    return gzip.decompress(packed.read_bytes())
+    return gzip.decompress((_ELSEWHERE.get(name) or LOGS / f"{name}.gz").read_bytes())
+
+
+_ELSEWHERE = {"arducopter_steps.bin": EXAMPLE}
+"""Recorded logs that come with the program."""
 
 
 SIZES = {
