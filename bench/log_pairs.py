@@ -14,6 +14,9 @@ other in at least 19 of 20 cases, |D| ≥ 1.645·√2, and neither is if the dif
 Between these, whether two flights tell it is chance: the right direction and unresolved both count as told, the
 opposite as wrong. The last line leaves out nothing and allows nothing: there, one set is better from the middle on,
 where one flight beats the other in nine of ten cases, as a verdict claims. Exits with 1 beyond the limits.
+
+Both logs are also fitted together from what is stored of each: how often what is true of the vehicle lies in the 90 %
+intervals, what is left of the least deviation of one log, and how that compares with a fit of all their rows.
 """
 
 import argparse
@@ -22,7 +25,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from io import BytesIO
 from typing import Final
@@ -31,12 +34,14 @@ import numpy as np
 
 from app.autopilots.log_readers import reader_of
 from app.core.analysis.analysis import analyze, find_unexplained
+from app.core.analysis.combined_fit import combine, log_fit
 from app.core.analysis.loop import AltitudeLoop, LoggedFlight
 from app.core.analysis.vehicle_fit import fit_copter
 from app.core.errors import TrajectoryError
 from app.core.statistics.gain_change import FlownLog, GainChange, compare_logs
 from app.log_library.flights import pack_flight, unpack_flight
 from app.logs.base import HEAD_BYTES
+from bench.copters.made_logs import truth_of
 from bench.copters.px4_simulation import fly_changes
 from bench.copters.rigs import RIGS
 from bench.copters.simulation import SimulatedCopter, StepFlight, fly_steps
@@ -90,6 +95,17 @@ class Circumstances:
     manoeuvre: object
 
 
+@dataclass(frozen=True, slots=True)
+class Together:
+    """A parameter of two logs fitted together: whether the truth is inside, what is left of the deviation, and its
+    deviation and distance in deviations of the fit of all rows."""
+
+    is_inside: bool
+    remaining: float
+    of_rows: float
+    apart: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
     """A pair: D as above, later − earlier, what the two logs tell, `no model` if one of the two cannot be analysed, and
@@ -105,6 +121,7 @@ class Judged:
     measured: str
     is_contradicted: bool
     took_s: float
+    together: Mapping[str, "Together"] = field(default_factory=dict)
 
     @property
     def class_(self) -> str:
@@ -193,7 +210,23 @@ def judge(number: int, *, seed: int = SEED) -> Judged:
         measured=_measured(found),
         is_contradicted=found is not None and found.is_contradicted,
         took_s=took_s,
+        together=_together([flight for _, _, flight in logs], copter) if known else {},
     )
+
+
+def _together(flights: Sequence[LoggedFlight], copter: SimulatedCopter) -> dict[str, Together]:
+    found, rows = combine([log_fit(fit_copter(each), each.loop) for each in flights]), fit_copter(*flights)
+    segment, step_s = flights[0].segments[0], flights[0].loop.step_s
+    truth = truth_of(copter, lasts_s=segment.duration_s, climb_rate_m_s=segment.v_m_s, step_s=min(step_s, 0.004))
+    return {
+        name: Together(
+            is_inside=abs(mean - truth[name]) <= 1.645 * found.deviation[name],
+            remaining=found.remaining[name],
+            of_rows=found.deviation[name] / getattr(rows.deviation, name),
+            apart=abs(mean - getattr(rows.mean, name)) / getattr(rows.deviation, name),
+        )
+        for name, mean in found.mean.items()
+    }
 
 
 def _changed(change: str, flight: LoggedFlight, random: np.random.Generator) -> dict[str, float]:
@@ -274,6 +307,13 @@ def report(judged: Sequence[Judged]) -> int:
     print(f"nothing between: told {np.mean([each.is_told_strictly for each in judged]):.0%}")
     print(f"contradicted by the flights: {sum(each.is_contradicted for each in judged)}")
     print(f"processor time of a comparison: at most {max(each.took_s for each in judged):.2f} s")
+    both = [each.together for each in judged if each.together]
+    for name in both[0]:
+        inside = np.mean([each[name].is_inside for each in both])
+        left, of_rows, apart = (
+            np.median([getattr(each[name], kind) for each in both]) for kind in ("remaining", "of_rows", "apart")
+        )
+        print(f"together, {name}: inside {inside:.0%}; left {left:.2f}; of all rows {of_rows:.2f}, apart {apart:.2f}")
     right, wrong = shares["all pairs"]
     return int(right < LIMITS[0] or wrong > LIMITS[1])
 
