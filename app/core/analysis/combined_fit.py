@@ -76,10 +76,10 @@ def log_fit(estimate: CopterEstimate, loop: AltitudeLoop) -> LogFit:
 def combine(fits: Sequence[LogFit]) -> CombinedFit:
     """Fit logs of one vehicle under one autopilot together; at least one."""
     usual, deviation = np.array(fits[-1].usual).T
-    told = [_told(each, usual, deviation) for each in fits]
-    precision = np.eye(len(_COMMON)) + np.sum([each for each, _ in told], axis=0)
+    evidence = [_evidence_of(each, usual, deviation) for each in fits]
+    precision = np.eye(len(_COMMON)) + np.sum([each for each, _ in evidence], axis=0)
     covariance = np.linalg.inv(precision)
-    mean = covariance @ np.sum([each for _, each in told], axis=0)
+    mean = covariance @ np.sum([each for _, each in evidence], axis=0)
     own = np.array([np.diag(_own(each)) for each in fits])
     in_common = np.average(np.sqrt(own), axis=0, weights=1.0 / own) ** 2
     independent = np.diag(covariance) * deviation**2
@@ -97,7 +97,7 @@ def combine(fits: Sequence[LogFit]) -> CombinedFit:
     )
 
 
-def _told(fit: LogFit, usual: Samples, deviation: Samples) -> tuple[Samples, Samples]:
+def _evidence_of(fit: LogFit, usual: Samples, deviation: Samples) -> tuple[Samples, Samples]:
     """Precision, shape (3, 3), that a flight adds to the prior, and its product with what the flight alone tells, (3,),
     both in deviations of the prior. Of 32 draws the precision may come out below the prior's: such a direction counts
     as not told."""
@@ -105,8 +105,8 @@ def _told(fit: LogFit, usual: Samples, deviation: Samples) -> tuple[Samples, Sam
     variances, directions = np.linalg.eigh(covariance / np.outer(deviation, deviation))
     precision = 1.0 / np.minimum(variances, 1.0)
     apart = directions.T @ ((np.array(fit.mean)[1:] - usual) / deviation)
-    told = np.where(precision > 1.0, precision * apart, 0.0)
-    return np.asarray(directions * (precision - 1.0) @ directions.T), np.asarray(directions @ told)
+    product = np.where(precision > 1.0, precision * apart, 0.0)
+    return np.asarray(directions * (precision - 1.0) @ directions.T), np.asarray(directions @ product)
 
 
 def _own(fit: LogFit) -> Samples:

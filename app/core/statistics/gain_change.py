@@ -104,11 +104,11 @@ class GainChange:
     def is_contradicted(self) -> bool:
         """Whether, but for the manoeuvre, the flights went the other way than the verdict says, beyond their
         scatter."""
-        told, gains_m, weather_m = self.comparison, self.by_gains_m, self.by_weather_m
-        if told is None or told.standard_error is None or gains_m is None or weather_m is None:
+        by_models, gains_m, weather_m = self.comparison, self.by_gains_m, self.by_weather_m
+        if by_models is None or by_models.standard_error is None or gains_m is None or weather_m is None:
             return False
-        is_decided, is_opposite = told.verdict in ("better", "worse"), (gains_m + weather_m) * gains_m < 0.0
-        return is_decided and is_opposite and abs(weather_m) > _BEYOND * told.standard_error
+        is_decided, is_opposite = by_models.verdict in ("better", "worse"), (gains_m + weather_m) * gains_m < 0.0
+        return is_decided and is_opposite and abs(weather_m) > _BEYOND * by_models.standard_error
 
 
 def compare_logs(earlier: FlownLog, later: FlownLog) -> GainChange:
