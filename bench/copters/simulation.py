@@ -4,6 +4,7 @@ Its thrust is a polynomial of the throttle and falls with the battery, its drag 
 dead time beside their lag, gusts shake it, and the estimator's altitude and climb rate wander.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,7 +25,6 @@ SETTLE_S: Final = 4.0
 STEP_LASTS_S: Final = 6.5
 HEIGHT_M: Final = 5.0
 CLIMB_M: Final = 2.0
-_STEPS: Final = round((SETTLE_S + 2 * STEP_LASTS_S) / STEP_S)
 _ROW_EVERY: Final = 40
 _SCORED_FROM: Final = round(SETTLE_S / STEP_S)
 
@@ -102,15 +102,19 @@ def sample(random: np.random.Generator) -> SimulatedCopter:
     )
 
 
-def fly_steps(copter: SimulatedCopter, parameters: Parameters, *, seed: int) -> StepFlight:
-    """Hover at 5 m, climb 2 m and descend again, in the weather of `seed`."""
-    targets = np.full(_STEPS, HEIGHT_M)
-    targets[_SCORED_FROM : _SCORED_FROM + round(STEP_LASTS_S / STEP_S)] += CLIMB_M
+def fly_steps(
+    copter: SimulatedCopter, parameters: Parameters, *, seed: int, changes_m: Sequence[float] = (CLIMB_M, -CLIMB_M)
+) -> StepFlight:
+    """Hover at 5 m, climb 2 m and descend again, or change the altitude so, in the weather of `seed`."""
+    steps = _SCORED_FROM + len(changes_m) * round(STEP_LASTS_S / STEP_S)
+    targets = np.full(steps, HEIGHT_M)
+    for place, change_m in enumerate(changes_m):
+        targets[_SCORED_FROM + place * round(STEP_LASTS_S / STEP_S) :] += change_m
     flown = fly_targets(copter, parameters, targets, seed=seed)
     scored = flown[_SCORED_FROM:]
     rows = flown[::_ROW_EVERY]
     segment = Segment(
-        time_s=np.asarray(STEP_S * np.arange(0, _STEPS, _ROW_EVERY), dtype=np.float64),
+        time_s=np.asarray(STEP_S * np.arange(0, steps, _ROW_EVERY), dtype=np.float64),
         z_m=rows[:, _Z],
         v_m_s=rows[:, _V],
         a_m_s2=rows[:, _A],

@@ -2,9 +2,9 @@
 
 Each fit is a normal distribution of thrust slope, motor lag and drag that holds what is usual once. What its flight
 itself tells is the rest: its precision less the prior's. These are independent, so they add up, and the prior counts
-once. What the errors of all flights have in common, by the vehicle's estimator, by what the model lacks, and by the
-fit of a short flight, does not average out: it is left out of the sum, and added to the result. The hover throttle
-differs from flight to flight with battery and load, and stays beside.
+once. Two things do not average out: the error of the slope that the vehicle's estimator causes is left out of the sum
+and added to the result, and a part of each deviation is that of errors which the fits of all its flights have in
+common. The hover throttle differs from flight to flight with battery and load, and stays beside.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,15 +14,17 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.loop import AltitudeLoop
-from app.core.analysis.vehicle_fit import USUAL_DRAG_1_S, USUAL_LAG_S, CopterEstimate
+from app.core.analysis.vehicle_fit import LAG_ROUNDING_S, USUAL_DRAG_1_S, USUAL_LAG_S, CopterEstimate
 from app.core.records.trajectory import Samples
 
 FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 """Of `Copter`, in the order of the arrays here."""
 _COMMON: Final = FITTED[1:]
-_ALIKE: Final = (0.04, 0.01, 0.06)
-"""Standard deviation of slope, lag, s, and drag, 1/s, that fits of short flights of one vehicle have in common: over
-simulated vehicles, eight flights each. Under an autopilot whose estimator adds more to the slope, that counts."""
+_IN_COMMON: Final = np.array([0.45, 0.5, 0.7])
+"""Share of the deviation of slope, lag and drag that the fits of a vehicle's flights have in common, by what the model
+lacks and by how fits of short flights err: over simulated vehicles, eight flights each."""
+_BETWEEN_MANOEUVRES: Final = 0.03
+"""So far apart are the slopes of one vehicle in quiet flights of different manoeuvres."""
 _LEAST_OWN: Final = 0.1
 _LARGEST_CONTRADICTION: Final = 0.99
 
@@ -30,13 +32,13 @@ _LARGEST_CONTRADICTION: Final = 0.99
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogFit:
     """What a log tells of its vehicle: mean, 4 numbers, and covariance, 4 × 4, by `FITTED`; `usual` are mean and
-    standard deviation of the slope, lag and drag over vehicles, and `shared` the standard deviations of the errors that
-    all flights of a vehicle have in common."""
+    standard deviation of the slope, lag and drag over vehicles, and `slope_error` is the part of the slope's deviation
+    that comes from the vehicle's estimator."""
 
     mean: Sequence[float]
     covariance: Sequence[Sequence[float]]
     usual: Sequence[tuple[float, float]]
-    shared: Sequence[float]
+    slope_error: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,24 +64,28 @@ class CombinedFit:
 def log_fit(estimate: CopterEstimate, loop: AltitudeLoop) -> LogFit:
     """What is stored of a fit of one flight under this loop."""
     values = np.array([[getattr(each, name) for name in FITTED] for each in estimate.draws])
+    covariance = np.cov(values.T) + np.diag([0.0, 0.0, LAG_ROUNDING_S**2, 0.0])
     return LogFit(
         mean=values.mean(axis=0).tolist(),
-        covariance=np.cov(values.T).tolist(),
+        covariance=covariance.tolist(),
         usual=[_without_negative(*each) for each in (loop.usual_slope, USUAL_LAG_S, USUAL_DRAG_1_S)],
-        shared=[max(loop.slope_error, _ALIKE[0]), *_ALIKE[1:]],
+        slope_error=loop.slope_error,
     )
 
 
 def combine(fits: Sequence[LogFit]) -> CombinedFit:
     """Fit logs of one vehicle under one autopilot together; at least one."""
     usual, deviation = np.array(fits[-1].usual).T
-    told = [_told(each, usual, deviation) for each in fits]
-    precision = np.eye(len(_COMMON)) + np.sum([each for each, _ in told], axis=0)
+    evidence = [_evidence_of(each, usual, deviation) for each in fits]
+    precision = np.eye(len(_COMMON)) + np.sum([each for each, _ in evidence], axis=0)
     covariance = np.linalg.inv(precision)
-    mean = covariance @ np.sum([each for _, each in told], axis=0)
-    shared = np.square(fits[-1].shared)
-    alone = np.min([np.diag(_own(each)) for each in fits], axis=0) + shared
-    together = np.diag(covariance) * deviation**2 + shared
+    mean = covariance @ np.sum([each for _, each in evidence], axis=0)
+    own = np.array([np.diag(_own(each)) for each in fits])
+    in_common = np.average(np.sqrt(own), axis=0, weights=1.0 / own) ** 2
+    independent = np.diag(covariance) * deviation**2
+    systematic = np.array([fits[-1].slope_error ** 2, 0.0, 0.0])
+    alone = own.min(axis=0) + systematic
+    together = np.minimum(independent + _IN_COMMON**2 * (in_common - independent) + systematic, alone)
     hover = [each.mean[0] for each in fits]
     return CombinedFit(
         mean=_named(usual + deviation * mean),
@@ -91,7 +97,7 @@ def combine(fits: Sequence[LogFit]) -> CombinedFit:
     )
 
 
-def _told(fit: LogFit, usual: Samples, deviation: Samples) -> tuple[Samples, Samples]:
+def _evidence_of(fit: LogFit, usual: Samples, deviation: Samples) -> tuple[Samples, Samples]:
     """Precision, shape (3, 3), that a flight adds to the prior, and its product with what the flight alone tells, (3,),
     both in deviations of the prior. Of 32 draws the precision may come out below the prior's: such a direction counts
     as not told."""
@@ -99,24 +105,22 @@ def _told(fit: LogFit, usual: Samples, deviation: Samples) -> tuple[Samples, Sam
     variances, directions = np.linalg.eigh(covariance / np.outer(deviation, deviation))
     precision = 1.0 / np.minimum(variances, 1.0)
     apart = directions.T @ ((np.array(fit.mean)[1:] - usual) / deviation)
-    told = np.where(precision > 1.0, precision * apart, 0.0)
-    return np.asarray(directions * (precision - 1.0) @ directions.T), np.asarray(directions @ told)
+    product = np.where(precision > 1.0, precision * apart, 0.0)
+    return np.asarray(directions * (precision - 1.0) @ directions.T), np.asarray(directions @ product)
 
 
 def _own(fit: LogFit) -> Samples:
-    """Covariance of slope, lag and drag, shape (3, 3), without what all flights have in common, but for a tenth of each
-    variance."""
+    """Covariance of slope, lag and drag, shape (3, 3), without the estimator's part."""
     covariance = np.array(fit.covariance)[1:, 1:]
-    variances = np.diag(covariance)
-    left = np.sqrt(np.maximum(1.0 - np.square(fit.shared) / variances, _LEAST_OWN))
-    return np.asarray(covariance * np.outer(left, left))
+    covariance[0, 0] -= min(fit.slope_error**2, (1.0 - _LEAST_OWN) * covariance[0, 0])
+    return covariance
 
 
 def _contradiction(fits: Sequence[LogFit], usual_deviation: float) -> float:
     """How sure it is that the thrust slopes differ: χ² of what each log alone tells of it."""
     from scipy.special import chdtr
 
-    variance = np.array([each.covariance[1][1] for each in fits])
+    variance = np.array([each.covariance[1][1] for each in fits]) + _BETWEEN_MANOEUVRES**2
     weight = np.maximum(1.0 / variance - usual_deviation**-2, 1e-6)
     usual = np.array([each.usual[0][0] for each in fits])
     alone = usual + (np.array([each.mean[1] for each in fits]) - usual) / variance / weight

@@ -13,6 +13,7 @@ and what the accelerometer sensed beside that has no mean over a row.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -25,7 +26,7 @@ from app.core.records.trajectory import Samples
 _SEED: Final = 1
 _ROW_S: Final = 0.1
 _QUANTILES: Final = (0.05, 0.95)
-_STRENGTH_DEVIATION: Final = 0.25
+STRENGTH_DEVIATION: Final = 0.25
 """How well one flight tells the strength of its disturbances, as a deviation of its logarithm: most of the error comes
 from what lasts for seconds, of which a flight has few. With this value nine of ten flights of random vehicles lie
 within a 90 % interval."""
@@ -67,16 +68,18 @@ def modelled_acceleration(steps: Steps, copter: Copter, step_s: float) -> Sample
     return np.asarray(GRAVITY_M_S2 * (thrust - 1.0) - copter.drag_1_s * steps.v_m_s)
 
 
-def in_other_weather(disturbances: Samples, random: np.random.Generator) -> Samples:
+def in_other_weather(
+    disturbances: Samples, random: np.random.Generator, *, strength_deviation: float = STRENGTH_DEVIATION
+) -> Samples:
     """Disturbances of another flight, shape (m, 3), by what this one tells of the weather and the estimator.
 
     Each frequency, of all of them alike, has another phase and strength, as two stretches of the same random process
-    have, and all frequencies together are stronger or weaker.
+    have, and all frequencies together are stronger or weaker, by this deviation of the logarithm.
     """
     spectrum = np.fft.rfft(disturbances, axis=0)
-    factor = random.standard_normal((len(spectrum), 2)) @ np.array([1.0, 1.0j]) / math.sqrt(2.0)
+    factor = random.standard_normal((len(spectrum), 2)).view(np.complex128)[:, 0] / math.sqrt(2.0)
     factor[0] = 1.0
-    strength = random.lognormal(-0.5 * _STRENGTH_DEVIATION**2, _STRENGTH_DEVIATION)
+    strength = random.lognormal(-0.5 * strength_deviation**2, strength_deviation)
     return np.asarray(strength * np.fft.irfft(spectrum * factor[:, None], n=len(disturbances), axis=0))
 
 
@@ -148,6 +151,20 @@ class FlightModel:
             elsewhen_m=np.array([each.altitude_m for each in then]),
         )
 
+    def errors_m(self, *loops: AltitudeLoop) -> tuple[Samples, Samples]:
+        """Error of each copter under each loop, m, shape (loops, k): in the weather of the flight, and in weather as
+        strong at another time."""
+        now, then = (
+            np.array([[self._flown(runs, loop).score[0] for loop in loops] for runs in every]).T
+            for every in (self._runs, self._elsewhen(strength_deviation=0.0))
+        )
+        return now, then
+
+    def still_m(self, *loops: AltitudeLoop) -> Samples:
+        """Mean error of the copters under each loop, m, shape (loops,), without disturbances: by the manoeuvre."""
+        every = [[replace(run, disturbances=np.zeros_like(run.disturbances)) for run in runs] for runs in self._runs]
+        return np.array([_means([self._flown(runs, loop).score for runs in every])[0] for loop in loops])
+
     def rows(self, loop: AltitudeLoop) -> Samples:
         """What the first copter flies in the weather of the flight, at the rows of the first segment, shape (n, 6) as
         `FLOWN`."""
@@ -156,11 +173,12 @@ class FlightModel:
         place = np.round((time_s - time_s[0]) / self._flight.loop.step_s).astype(np.int64)
         return np.asarray(flown[np.minimum(place, len(flown) - 1)])
 
-    def _elsewhen(self) -> Iterator[list[Run]]:
+    def _elsewhen(self, *, strength_deviation: float = STRENGTH_DEVIATION) -> Iterator[list[Run]]:
         """The runs at another time, the same at every call: kept, they would be most of what an analysis keeps."""
         random = np.random.default_rng(_SEED)
+        other = partial(in_other_weather, random=random, strength_deviation=strength_deviation)
         for runs in self._runs:
-            yield [replace(run, disturbances=in_other_weather(run.disturbances, random)) for run in runs]
+            yield [replace(run, disturbances=other(run.disturbances)) for run in runs]
 
     def _as_active(self, runs: Sequence[Run], activity: float) -> list[Run]:
         """The runs with the noise of the sensed acceleration that moves the throttle as much as in the flight."""

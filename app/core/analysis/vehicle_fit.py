@@ -28,7 +28,7 @@ USUAL_LAG_S: Final = (0.05, 0.05)
 """Mean and standard deviation over vehicles; that of the slope depends on the autopilot."""
 
 _LAGS_S: Final = np.linspace(0.0, 0.25, 26)
-_ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
+LAG_ROUNDING_S: Final = 0.01 / math.sqrt(12.0)
 _OF_JUMP: Final = 1.0 / math.sqrt(6.0)
 """A jump at any time between two rows has a twelfth of its square as variance, and moves both from their middles by
 half of it."""
@@ -151,7 +151,7 @@ def fit_copter(*flights: LoggedFlight) -> CopterEstimate:
     values = _draws(regressions, weight / weight.sum())
     return CopterEstimate(
         mean=_copter(values.mean(axis=0)),
-        deviation=_copter(np.hypot(values.std(axis=0), _ROUNDING)),
+        deviation=_copter(np.hypot(values.std(axis=0), [0.0, 0.0, 0.0, LAG_ROUNDING_S])),
         draws=tuple(_copter(row) for row in values),
         residual_m_s2=math.sqrt(best.variance) * GRAVITY_M_S2,
     )

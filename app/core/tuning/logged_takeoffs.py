@@ -19,13 +19,14 @@ from app.core.formatting import format_gains, interval_text, short
 from app.core.policy import Gains
 from app.core.records.metrics import StepResponse, step_response
 from app.core.records.trajectory import Trajectory
+from app.core.statistics.gain_change import COMPARED_S, ScoredTakeoff
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.evidence import Evidence
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import predict_flight
 from app.core.tuning.proposals import next_proposal
 
-SHORTEST_S: Final = 10.0
+SHORTEST_S: Final = COMPARED_S
 MOST_TAKEOFFS: Final = 8
 _BETTER: Final = 0.95
 _LARGEST_RESIDUAL_M: Final = (0.05, 0.15)
@@ -142,6 +143,14 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
         proposed=proposed if is_better else None,
         predicted=predict_flight(calibration, best, experiment.space.vector(shown.gains)).trajectory,
     )
+
+
+def score_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> list[ScoredTakeoff]:
+    """What other logs of the vehicle are compared with: the takeoffs that an analysis uses. Raises TrajectoryError as
+    `analyze_takeoffs` does."""
+    experiment = Takeoff(window_s=COMPARED_S)
+    used, _ = comparable_takeoffs(takeoffs)
+    return [ScoredTakeoff(gains=dict(each.gains), error_m=experiment.error(each.trajectory)) for each in used]
 
 
 def comparable_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> tuple[list[LoggedTakeoff], float]:

@@ -11,7 +11,8 @@ import pytest
 from app.autopilots.log_readers import read_takeoff
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
-from app.core.tuning.logged_takeoffs import LoggedTakeoff, analyze_takeoffs
+from app.core.statistics.gain_change import compare_takeoffs
+from app.core.tuning.logged_takeoffs import LoggedTakeoff, analyze_takeoffs, score_takeoffs
 from tests.core.tuning.flying import compiled_only
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded
@@ -128,3 +129,12 @@ def test_the_same_log_gives_the_same_answer() -> None:
     one, other = (analyze_takeoffs([from_log("paparazzi_283_13_82.tlog")]) for _ in range(2))
     assert one.proposed == other.proposed
     assert np.array_equal(one.predicted["altitude_m"], other.predicted["altitude_m"])
+
+
+def test_takeoffs_of_two_logs_are_compared_over_ten_seconds() -> None:
+    """Which all of them last."""
+    slow, fast = (from_log(f"paparazzi_{gains}.tlog") for gains in ("283_13_82", "1624_1356_195"))
+    (found,) = score_takeoffs([slow])
+    assert found.gains == slow.gains
+    assert found.error_m == Takeoff(window_s=10.0).error(slow.trajectory)
+    assert compare_takeoffs([found], score_takeoffs([fast])).verdict == "better"
