@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from app.db.base import utc_now
 from app.db.models import AnalysedLogRow, LogFileRow, LoggedVehicleRow
 from app.db.session import Database
+from app.log_library import flights, stored_answers
 from tests.builders import get, problems_of
 from tests.log_library.fleet import FLEET
 from tests.log_library.library import FLOWN, PATH, VEHICLES, add, change, copied, library
@@ -303,6 +304,11 @@ def test_a_log_after_one_that_it_cannot_be_compared_with_has_a_document_without_
     assert client.get(f"{PATH}/{logs[COPTER]}/comparison").status_code == 503
     page = client.get(f"{PATH}/{logs[COPTER]}/export.html")
     assert (page.status_code, "Compared with" in page.text) == (200, False)
+
+
+def test_the_largest_answer_and_the_largest_flight_fit_into_what_a_log_may_take() -> None:
+    """60 KiB, with the numbers and the fit beside them."""
+    assert stored_answers.LARGEST_BYTES + flights.LARGEST_BYTES + 2**10 <= 60 * 2**10
 
 
 def test_others_may_read_the_library_but_not_change_it(
