@@ -1,27 +1,28 @@
 """The `gainline` command. Each command imports what it needs when it runs, so that help comes at once."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
 
+from app.cli.log_commands import logs
 from app.cli.options import (
     CampaignSource,
     DataDir,
+    FlownGains,
     GivenCampaign,
     GivenGains,
+    GivenLog,
     GivenSettings,
     JsonOut,
     Overrule,
+    ParametersOut,
     Reproducible,
     StartGains,
-    spare_other_parameters,
+    settings_of,
 )
 from app.core.errors import GainlineError
-
-if TYPE_CHECKING:
-    from app.common.settings import Settings
 
 
 class _Reporting(TyperGroup):
@@ -45,6 +46,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Tune a drone's controller gains in a few flights.",
 )
+app.add_typer(logs, name="logs")
 
 
 @app.command()
@@ -68,7 +70,7 @@ def serve(
     """Serve the dashboard and its API until stopped."""
     from app.runtime.serve import serve as run
 
-    run(_settings(host=host, port=port, data_dir=data_dir), with_worker=worker)
+    run(settings_of(host=host, port=port, data_dir=data_dir), with_worker=worker)
 
 
 @app.command()
@@ -81,7 +83,7 @@ def unlock(
     """Print a link that lets one browser command the real vehicles of the running server."""
     from app.cli.unlock import unlock as run
 
-    run(_settings(data_dir=data_dir), script=script)
+    run(settings_of(data_dir=data_dir), script=script)
 
 
 @app.command()
@@ -89,7 +91,7 @@ def worker(data_dir: DataDir = None) -> None:
     """Run the worker for a server that was started with --no-worker."""
     from app.runtime.worker import run_worker
 
-    run_worker(_settings(data_dir=data_dir))
+    run_worker(settings_of(data_dir=data_dir))
 
 
 @app.command()
@@ -122,7 +124,7 @@ def run(
         gains=gains or [],
         settings=settings or [],
     )
-    run_campaign(file, json_out=json_out, data_dir=_settings(data_dir=data_dir).data_dir, overrule=overrule)
+    run_campaign(file, json_out=json_out, data_dir=settings_of(data_dir=data_dir).data_dir, overrule=overrule)
 
 
 @app.command()
@@ -252,33 +254,16 @@ def import_log(
     """Import the log of a flight flown elsewhere; takeoff and gains are read from it."""
     from app.cli.files import import_log as run
 
-    settings = _settings(data_dir=data_dir)
+    settings = settings_of(data_dir=data_dir)
     run(file, settings, campaign=campaign, trial=trial, takeoff=takeoff, yes=yes, json_out=json_out)
 
 
 @app.command()
 def analyze(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG",
-            help="ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data "
-            "(a .log next to it is read too) or .tlog of takeoffs; or a trace of the vertical loop, .csv or .csv.gz.",
-        ),
-    ],
-    gains: Annotated[
-        str, typer.Option(metavar="KP,KI,KD", help="Gains flown, for the replica, if no log contains them.")
-    ] = "",
+    log: GivenLog,
+    gains: FlownGains = "",
     vehicle: Annotated[int | None, typer.Option(metavar="ID", help="System id, if a log has several vehicles.")] = None,
-    params: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write the proposed gains: a .param file for ArduCopter, a .params file for PX4, a section of an "
-            "airframe file for Paparazzi.",
-            callback=spare_other_parameters,
-        ),
-    ] = None,
+    params: ParametersOut = None,
     json_out: JsonOut = None,
 ) -> None:
     """Propose better altitude gains from a flight log, and print what the model predicts for them; and say how well the
@@ -303,7 +288,7 @@ def report(
     """Write a campaign's report as one self-contained file. PDF needs Chromium."""
     from app.cli.files import report as run
 
-    run(campaign, _settings(data_dir=data_dir), out=out, kind=kind)
+    run(campaign, settings_of(data_dir=data_dir), out=out, kind=kind)
 
 
 @app.command()
@@ -317,7 +302,7 @@ def bundle(
     """Export a campaign with its records, photos and logs as one file, for import into another installation."""
     from app.cli.files import bundle as run
 
-    run(campaign, _settings(data_dir=data_dir), out=out)
+    run(campaign, settings_of(data_dir=data_dir), out=out)
 
 
 @app.command()
@@ -328,11 +313,4 @@ def unbundle(
     """Import a campaign from another installation, with identical numbers."""
     from app.cli.files import unbundle as run
 
-    run(file, _settings(data_dir=data_dir))
-
-
-def _settings(**given: str | int | Path | None) -> "Settings":
-    """The environment's settings with what was given on the command line in place of them."""
-    from app.common.settings import read_settings
-
-    return read_settings({name: value for name, value in given.items() if value is not None})
+    run(file, settings_of(data_dir=data_dir))

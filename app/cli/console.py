@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from app.common.errors import GainlineError, InputError, Problem
+from app.common.schemas import without_control_characters
 
 TO_STDOUT: Final = Path("-")
 WIDTH_OF_A_FILE: Final = 200
@@ -35,13 +36,18 @@ def show_error(error: GainlineError) -> None:
     err.print(escape(error.hint))
 
 
+def shown(text: str) -> str:
+    """A text of a log or file as a console prints it as it is: without control characters, and no markup."""
+    return escape(without_control_characters(text))
+
+
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title: str) -> Table:
     """Table of formatted cells: the first column aligned left, the others right."""
-    drawn = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+    drawn = Table(title=shown(title), title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
     for index, column in enumerate(columns):
-        drawn.add_column(column, justify="left" if index == 0 else "right", no_wrap=True)
+        drawn.add_column(shown(column), justify="left" if index == 0 else "right", no_wrap=True)
     for row in rows:
-        drawn.add_row(*row)
+        drawn.add_row(*map(shown, row))
     return drawn
 
 

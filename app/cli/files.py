@@ -24,8 +24,9 @@ from app.common.settings import Settings
 from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
+from app.documents.html import chart_library
 from app.logs.formats import companion_of
-from app.reports.html import chart_library, file_name, render
+from app.reports.html import file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
 
@@ -51,7 +52,7 @@ def import_log(
     out.print(f"{escape(file.name)}: {escape(flown.summary)}.")
     for note in flown.notes:
         out.print(f"  {escape(note)}", style="dim")
-    with _open_database(settings) as database:
+    with open_database(settings) as database:
         stored = _store(database, campaign, trial, flown, yes=yes)
     error = "no error" if stored.error is None else f"error {stored.error:.4f}"
     flight = f"Trial {stored.number} of campaign {stored.campaign_id}"
@@ -64,7 +65,7 @@ def import_log(
 
 
 @contextmanager
-def _open_database(settings: Settings) -> Iterator[Database]:
+def open_database(settings: Settings) -> Iterator[Database]:
     """The data folder's database. Raises SchemaError unless it is at the program's revision."""
     require_current(settings.database_file)
     with closing(Database(settings.database_file)) as database:
@@ -106,7 +107,7 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
     """Write the campaign's bundle; a server may run meanwhile. Raises InputError when the file cannot be written."""
-    with _open_database(settings) as database, database.read() as session:
+    with open_database(settings) as database, database.read() as session:
         campaign_id = campaigns.find_by_id_or_name(session, campaign)
         target = out or Path(f"campaign-{campaign_id}.gainline.zip")
         arriving = target.with_name(f".{target.name}.part")
@@ -126,7 +127,7 @@ def unbundle(file: Path, settings: Settings) -> None:
     """Import the campaign and print a summary. Raises InputError that names what is wrong with the file."""
     with (
         reading(file, "a bundle"),
-        _open_database(settings) as database,
+        open_database(settings) as database,
         file.open("rb") as stream,
         Bundle(stream) as opened,
     ):
@@ -168,7 +169,7 @@ def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format 
     print a PDF is installed.
     """
     chosen = kind or _format_of(out)
-    with _open_database(settings) as database, database.read() as session:
+    with open_database(settings) as database, database.read() as session:
         found = report_of(session, campaigns.find_by_id_or_name(session, campaign))
     html = render(found, chart_library(settings.ui_dir)).html
     content = print_pdf(lambda: html) if chosen == "pdf" else html.encode()

@@ -1,9 +1,12 @@
 """Options of the `gainline` command that are long or shared, and the files that they do not overwrite."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+
+if TYPE_CHECKING:
+    from app.common.settings import Settings
 
 
 def _begins_otherwise(target: Path | None, *beginnings: bytes) -> bool:
@@ -34,9 +37,37 @@ def spare_other_parameters(target: Path | None) -> Path | None:
     return target
 
 
+def settings_of(**given: str | int | Path | None) -> "Settings":
+    """The environment's settings with what was given on the command line in place of them."""
+    from app.common.settings import read_settings  # noqa: PLC0415 - help needs none
+
+    return read_settings({name: value for name, value in given.items() if value is not None})
+
+
 JsonOut = Annotated[
     Path | None,
     typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.", callback=_spare_recording),
+]
+ParametersOut = Annotated[
+    Path | None,
+    typer.Option(
+        "--params",
+        metavar="FILE",
+        help="Write the proposed gains: a .param file for ArduCopter, a .params file for PX4, a section of an airframe "
+        "file for Paparazzi.",
+        callback=spare_other_parameters,
+    ),
+]
+FlownGains = Annotated[
+    str, typer.Option("--gains", metavar="KP,KI,KD", help="Gains flown, for the replica, if no log contains them.")
+]
+GivenLog = Annotated[
+    Path,
+    typer.Argument(
+        metavar="LOG",
+        help="ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data "
+        "(a .log next to it is read too) or .tlog of takeoffs; or a trace of the vertical loop, .csv or .csv.gz.",
+    ),
 ]
 DataDir = Annotated[Path | None, typer.Option(show_default="GAINLINE_DATA_DIR", help="Folder of the database.")]
 CampaignSource = Annotated[

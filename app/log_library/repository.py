@@ -47,7 +47,8 @@ def logs_of(session: Session, vehicle_id: int) -> Sequence[AnalysedLogRow]:
 def log_before(session: Session, row: AnalysedLogRow) -> int | None:
     """Id of the log before it of the same vehicle; None if there is none, or it is not kept."""
     here = tuple_(AnalysedLogRow.ordered_at, AnalysedLogRow.id) < tuple_(row.ordered_at, row.id)
-    wanted = select(AnalysedLogRow.id).where(AnalysedLogRow.vehicle_id == row.vehicle_id, here)
+    kept = AnalysedLogRow.vehicle_id.is_not(None)  # where the vehicle of the row is NULL, so are those of the others
+    wanted = select(AnalysedLogRow.id).where(AnalysedLogRow.vehicle_id == row.vehicle_id, kept, here)
     return session.scalar(wanted.order_by(AnalysedLogRow.ordered_at.desc(), AnalysedLogRow.id.desc()).limit(1))
 
 

@@ -7,8 +7,9 @@ from fastapi import APIRouter, Query, Response, status
 
 from app.campaigns.schemas import Campaign
 from app.common.schemas import Page, uploaded_name
+from app.documents.html import chart_library
 from app.figures.base import Card
-from app.log_library import comparisons, service, stored_logs, trends
+from app.log_library import comparisons, documents, service, stored_logs, trends
 from app.log_library.library_schemas import (
     AnalysedLog,
     LogAnalysis,
@@ -33,6 +34,7 @@ from app.web.dependencies import (
     WantedPart,
     Writer,
     described,
+    document_response,
 )
 
 FlownGains = Annotated[str, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")]
@@ -152,6 +154,14 @@ def compare_logs(
 def export_log(session: Reader, log_id: Id) -> LogExport:
     """The answer and all parameters, for other programs."""
     return stored_logs.export(session, log_id)
+
+
+@router.get("/{log_id}/export.html", response_class=Response, responses=described("text/html", binary=False))
+def export_log_as_html(session: Reader, settings: CurrentSettings, log_id: Id) -> Response:
+    """The answer, its figures and what changed since the log before it, as one page that can be saved and sent: it
+    needs neither Gainline nor a network."""
+    document = documents.document_of(session, log_id, chart_library(settings.ui_dir))
+    return document_response(document, documents.file_name(log_id))
 
 
 @router.post("/{log_id}/campaign", status_code=status.HTTP_201_CREATED)

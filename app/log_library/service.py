@@ -1,7 +1,7 @@
 """Operations on log files: analyse one of any autopilot, and create a campaign from one."""
 
 import gzip
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Final
 
@@ -36,6 +36,15 @@ _FURTHER_FLIGHTS: Final = 6
 _ANY_RECORD: Final = Accepted(confirm=True, invalid=True)
 
 
+def analyze_limited(
+    content: bytes, companion: bytes | None, *, name: str, gains: str = "", vehicle: int | None = None
+) -> "AnalysedContent":
+    """Analyse a log as below in a process with limits, and store nothing."""
+    from app.log_library.content import analyze_content  # noqa: PLC0415 - imports every reader and model
+
+    return run_limited(FILE, analyze_content, content, companion, name, gains, vehicle)
+
+
 def analyze_upload(
     database: Database,
     content: bytes,
@@ -44,9 +53,10 @@ def analyze_upload(
     name: str,
     gains: str = "",
     vehicle: int | None = None,
+    analyze: "Callable[..., AnalysedContent]" = analyze_limited,
 ) -> LogAnalysis:
-    """Analyse an uploaded log or trace in a process with limits, and store the answer; if this version has answered it
-    before, that one. `companion` is the .log file of Paparazzi's .data file, `gains` those flown, if no log contains
+    """Analyse a log or trace, by default in a process with limits, and store the answer; if this version has answered
+    it before, that one. `companion` is the .log file of Paparazzi's .data file, `gains` those flown, if no log contains
     them, `vehicle` the system id of one of several vehicles.
 
     Raises InputError that names what is missing or wrong.
@@ -54,20 +64,11 @@ def analyze_upload(
     digest = stored_logs.digest_of(content, companion, gains=gains, vehicle=vehicle)
     with database.read() as session:
         if (known := stored_logs.answered(session, digest)) is not None:
-            return stored_logs.get_analysis(session, known)
+            return known
     found = analyze(content, companion, name=name, gains=gains, vehicle=vehicle)
     with database.write() as session:
         log_id = stored_logs.store(session, found, digest, stored_logs.digest_of(content, companion))
         return stored_logs.get_analysis(session, log_id)
-
-
-def analyze(
-    content: bytes, companion: bytes | None, *, name: str, gains: str = "", vehicle: int | None = None
-) -> "AnalysedContent":
-    """Analyse a log as above, and store nothing."""
-    from app.log_library.content import analyze_content  # noqa: PLC0415 - imports every reader and model
-
-    return run_limited(FILE, analyze_content, content, companion, name, gains, vehicle)
 
 
 def analyze_example(database: Database) -> LogAnalysis:
@@ -88,11 +89,12 @@ def read_upload(
 def start_of(session: Session, log_id: int) -> tuple[Sequence[Takeoff] | Definition, str]:
     """What a campaign starts with of a stored log, and its name; its takeoffs are in its file alone. Raises
     NotFoundError; ConflictError if the file is not stored; InputError if no campaign starts from it."""
-    name, definition = stored_logs.definition_of(session, log_id)
-    if definition is not None:
-        return definition, name
+    stored = stored_logs.stored_answer(session, log_id)
+    name, vehicle = stored.answer.file_name, stored.answer.vehicle
+    if stored.definition is not None:
+        return stored.definition, name
     file = stored_logs.get_file(session, log_id)
-    return read_upload(file.content, file.companion, name=name), name
+    return read_upload(file.content, file.companion, name=name, vehicle=vehicle), name
 
 
 def start_campaign(

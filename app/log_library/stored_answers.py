@@ -14,7 +14,7 @@ from app.log_library.content import AnalysedContent
 from app.log_library.library_schemas import StoredAnswer
 from app.log_library.schemas import Part
 
-LARGEST_BYTES: Final = 36 * 2**10
+LARGEST_BYTES: Final = 35 * 2**10
 _LARGEST_JSON_BYTES: Final = 2**24
 _LEAST_POINTS: Final = 100
 _LEVEL: Final = 12

@@ -1,6 +1,7 @@
 """Operations on analysed logs: each is stored when it is analysed, kept as a flight of a vehicle, or deleted."""
 
 import hashlib
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import timedelta
 from pathlib import PurePath
@@ -9,8 +10,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app import __version__
-from app.campaigns.schemas import Definition
-from app.common.errors import ConflictError, InputError, NotFoundError, Problem, TooLargeError
+from app.common.errors import ConflictError, InputError, NotFoundError, Problem, StorageError, TooLargeError
 from app.common.schemas import Page
 from app.db.base import added, utc_now
 from app.db.models import AnalysedLogRow, LogFileRow, LoggedVehicleRow
@@ -38,10 +38,15 @@ def digest_of(content: bytes, companion: bytes | None, *, gains: str = "", vehic
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
 
 
-def answered(session: Session, digest: str) -> int | None:
-    """Id of the log that this version has answered before; None if it has not."""
+def answered(session: Session, digest: str) -> LogAnalysis | None:
+    """What this version has answered to the log before; None if nothing, and if that cannot be read or is due to be
+    deleted."""
     row = repository.of_digest_or_none(session, digest)
-    return row.id if row is not None and row.program == __version__ else None
+    if row is None or row.program != __version__ or (row.vehicle is None and row.analysed_at < utc_now() - UNKEPT_FOR):
+        return None
+    with suppress(StorageError):
+        return get_analysis(session, row.id)
+    return None
 
 
 def store(session: Session, found: AnalysedContent, digest: str, file_digest: str) -> int:
@@ -97,6 +102,13 @@ def list_logs(session: Session, part: Part, *, vehicle_id: int | None, kept: boo
 def list_vehicles(session: Session) -> list[LoggedVehicle]:
     """The vehicles with kept logs, the one that flew last first."""
     return [vehicle_view(*each) for each in repository.vehicles(session)]
+
+
+def vehicle_id_of(session: Session, name: str) -> int:
+    """Id of the vehicle of that name, ignoring case. Raises NotFoundError."""
+    if (found := repository.vehicle_of_name_or_none(session, name)) is None:
+        raise NotFoundError("vehicle of logs", name, hint="`gainline logs list` shows the vehicles with kept logs.")
+    return found.id
 
 
 def vehicle_view(vehicle: LoggedVehicleRow, logs: int, newest: AnalysedLogRow) -> LoggedVehicle:
@@ -189,11 +201,9 @@ def file_content(session: Session, log_id: int, *, companion: bool) -> tuple[str
     return str(PurePath(name).with_suffix(".log")), stored.companion
 
 
-def definition_of(session: Session, log_id: int) -> tuple[str, Definition | None]:
-    """Name of a log, and the definition of the campaign that starts from it, if no file is needed. Raises
-    NotFoundError, StorageError."""
-    row = repository.log_with_answer(session, log_id)
-    return row.file_name, stored_answers.unpack(row.answer).definition
+def stored_answer(session: Session, log_id: int) -> StoredAnswer:
+    """An answer as it is stored. Raises NotFoundError, StorageError."""
+    return stored_answers.unpack(repository.log_with_answer(session, log_id).answer)
 
 
 def log_view(row: AnalysedLogRow) -> AnalysedLog:

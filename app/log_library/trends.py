@@ -18,7 +18,7 @@ from app.log_library.library_schemas import CombinedVehicle, LoggedVehicleDetail
 from app.log_library.schemas import EstimatedValue
 from app.log_library.stored_logs import log_view, vehicle_view
 
-_QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]]]] = (
+QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]]]] = (
     ("Hover throttle", 3, lambda found: None if found.hover_throttle is None else found.hover_throttle.mean),
     ("Mean deviation (mm)", 1, lambda found: None if found.deviation_m is None else 1e3 * found.deviation_m),
     ("Throttle activity", 4, attrgetter("activity")),
@@ -56,7 +56,7 @@ def trend_figure(session: Session, vehicle_id: int, theme: ThemeName) -> Card:
 def trend_plot(name: str, logs: Sequence[LogNumbers]) -> Plot:
     """A panel for each quantity that a log tells."""
     panels = []
-    for title, digits, value_of in _QUANTITIES:
+    for title, digits, value_of in QUANTITIES:
         known = {float(place): value for place, log in enumerate(logs, 1) if (value := value_of(log)) is not None}
         line = Line(name=title, style="measured", x=tuple(known), y=tuple(known.values()), marks=True)
         panels += [Panel(y_title=title, digits=digits, lines=(line,))] * bool(known)

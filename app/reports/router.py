@@ -5,10 +5,11 @@ from fastapi import APIRouter, Response
 from app.campaigns.service import get_row
 from app.common.settings import Settings
 from app.db.session import Database
-from app.reports.html import Document, chart_library, file_name, render
+from app.documents.html import Document, chart_library
+from app.reports.html import file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of
-from app.web.dependencies import CurrentDatabase, CurrentSettings, Id, described
+from app.web.dependencies import CurrentDatabase, CurrentSettings, Id, described, document_response
 
 router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 
@@ -17,14 +18,7 @@ router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
     """The whole campaign as one page that can be saved and sent: it needs neither Gainline nor a network."""
     document = _document(database, settings, campaign_id)
-    return Response(
-        document.html,
-        media_type="text/html",
-        headers={
-            "Content-Security-Policy": document.policy,
-            "Content-Disposition": f'inline; filename="{file_name(campaign_id, "html")}"',
-        },
-    )
+    return document_response(document, file_name(campaign_id, "html"))
 
 
 @router.get("/{campaign_id}/report.pdf", response_class=Response, responses=described("application/pdf"))

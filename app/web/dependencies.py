@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import IO, Annotated, Any, BinaryIO, Final, TypeVar
 
-from fastapi import Depends, Header, Path, Query, Request
+from fastapi import Depends, Header, Path, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ValidationError
@@ -24,6 +24,7 @@ from app.common.errors import InputError, MediaTypeError, Problem
 from app.common.settings import Settings
 from app.db.pages import Part
 from app.db.session import Database, carry_out_once
+from app.documents.html import Document
 from app.figures.theme import ThemeName
 from app.live.hub import Live as LiveLink
 from app.web.origin import caller_of
@@ -292,6 +293,12 @@ def described(*types: str, binary: bool = True) -> dict[int | str, dict[str, Any
     """Description of a response that is a file of one of these media types, for OpenAPI."""
     schema = {"type": "string", "format": "binary"} if binary else {"type": "string"}
     return {200: {"content": {each: {"schema": schema} for each in types}}}
+
+
+def document_response(document: Document, name: str) -> Response:
+    """Response with a document under its own content security policy, which allows only the file's own content."""
+    headers = {"Content-Security-Policy": document.policy, "Content-Disposition": f'inline; filename="{name}"'}
+    return Response(document.html, media_type="text/html", headers=headers)
 
 
 def download(file: IO[bytes], name: str, *, media_type: str) -> StreamingResponse:

@@ -7,15 +7,19 @@ from typing import Any, Final
 
 from jsonschema import Draft202012Validator
 
+from app.log_library.library_schemas import LogExport
 from app.log_library.schemas import LogAnswer
 
-DOCUMENTED: Final = Path(__file__).parents[2] / "docs" / "log-answer.schema.json"
+_DOCS: Final = Path(__file__).parents[2] / "docs"
+DOCUMENTED: Final = _DOCS / "log-answer.schema.json"
+EXPORTED: Final = _DOCS / "log-export.schema.json"
 _MAY_HAVE_BLANKS: Final = frozenset({"file_name", "name", "suggested_name", "title", "vehicle_name"})
 
 
-def generated() -> dict[str, Any]:
-    """The schema of what the program writes."""
-    return LogAnswer.model_json_schema(mode="serialization")
+def generated() -> dict[Path, dict[str, Any]]:
+    """The schemas of what the program writes, by their documents."""
+    written: dict[Path, type[LogAnswer]] = {DOCUMENTED: LogAnswer, EXPORTED: LogExport}
+    return {document: model.model_json_schema(mode="serialization") for document, model in written.items()}
 
 
 def require_data(answer: Mapping[str, Any]) -> None:

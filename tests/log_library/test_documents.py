@@ -1,17 +1,20 @@
-"""The documented schema of an answer."""
+"""The documented schemas of an answer and of an exported log."""
 
 import json
+from pathlib import Path
 
+import pytest
 from jsonschema import Draft202012Validator
 
 from app.core.reasons import ReasonCode
-from tests.log_library.documents import DOCUMENTED, generated
+from tests.log_library.documents import DOCUMENTED, EXPORTED, generated
 
 
-def test_the_documented_schema_is_that_of_the_program() -> None:
+@pytest.mark.parametrize("document", [DOCUMENTED, EXPORTED], ids=lambda path: path.name)
+def test_the_documented_schema_is_that_of_the_program(document: Path) -> None:
     """Write it again with `python -m tests.log_library.test_documents`."""
-    assert json.loads(DOCUMENTED.read_text()) == generated()
-    Draft202012Validator.check_schema(generated())
+    assert json.loads(document.read_text()) == generated()[document]
+    Draft202012Validator.check_schema(generated()[document])
 
 
 def test_every_reason_is_documented() -> None:
@@ -20,4 +23,5 @@ def test_every_reason_is_documented() -> None:
 
 
 if __name__ == "__main__":
-    DOCUMENTED.write_text(json.dumps(generated(), indent=2) + "\n")
+    for document, schema in generated().items():
+        document.write_text(json.dumps(schema, indent=2) + "\n")

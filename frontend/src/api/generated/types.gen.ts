@@ -8548,6 +8548,36 @@ export type ExportLogResponses = {
 
 export type ExportLogResponse = ExportLogResponses[keyof ExportLogResponses];
 
+export type ExportLogAsHtmlData = {
+    body?: never;
+    path: {
+        /**
+         * Log Id
+         */
+        log_id: number;
+    };
+    query?: never;
+    url: '/api/log-analyses/{log_id}/export.html';
+};
+
+export type ExportLogAsHtmlErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ExportLogAsHtmlError = ExportLogAsHtmlErrors[keyof ExportLogAsHtmlErrors];
+
+export type ExportLogAsHtmlResponses = {
+    /**
+     * Successful Response
+     */
+    200: string;
+};
+
+export type ExportLogAsHtmlResponse = ExportLogAsHtmlResponses[keyof ExportLogAsHtmlResponses];
+
 export type StartStoredCampaignData = {
     body?: never;
     headers?: {
