@@ -20,6 +20,8 @@ _SHORTEST_S: Final = 8.0
 _SLOWEST_HZ: Final = 0.2
 _LEAST_PERIODS: Final = 5.0
 _SMOOTHED_PERIODS: Final = 3.0
+_STRONG: Final = 0.95
+"""Quantile of the envelope: its largest values may be those of a takeoff or of the first step."""
 _ABOVE_NOISE: Final = 40.0
 """Power of a line over the median beside it. Of noise alone, the largest of 500 lines has about nine times that."""
 _BESIDE: Final = 31
@@ -153,7 +155,7 @@ def find_oscillation(time_s: Samples, deviation_m: Samples, reference_m: Samples
     at_hz = float(frequency_hz[line] + frequency_hz[1] * 0.5 * (left - right) / (left - 2.0 * middle + right))
     turned = _detrended(time_s, deviation_m) * np.exp(-2j * np.pi * at_hz * time_s)
     envelope_m = 2.0 * np.abs(uniform_filter1d(turned, max(round(_SMOOTHED_PERIODS / at_hz / step_s), 1)))
-    oscillates = np.flatnonzero(envelope_m > 0.5 * envelope_m.max())
+    oscillates = np.flatnonzero(envelope_m > 0.5 * np.quantile(envelope_m, _STRONG))
     if len(oscillates) * step_s * at_hz < _LEAST_PERIODS:
         return None
     amplitude_m = float(np.median(envelope_m[oscillates]))
