@@ -50,6 +50,9 @@ def _print_part(out: Console, title: str, texts: PartTexts) -> None:
         out.print(shown(f"  {reason}"))
     for facts in texts.facts:
         out.print(shown(f"{facts.title}: {', '.join(facts.values)}."))
+    for shape in texts.shapes:
+        out.print(shown(f"{shape.title}: {shape.found}"), style="yellow")
+        out.print(shown(f"  {shape.advice}"))
     if texts.table is not None:
         out.print(table(texts.table.columns, texts.table.rows, title=texts.table.title))
     for note in texts.notes:

@@ -10,6 +10,7 @@ from app.campaigns.schemas import Definition
 from app.common.schemas import Gains, Name, Request, Schema
 from app.core.analysis.analysis import Grade
 from app.core.analysis.description import Description
+from app.core.analysis.shapes import FailureShape
 from app.core.statistics.comparisons import Verdict
 from app.figures.base import Card
 from app.figures.panels import Plot
@@ -158,3 +159,13 @@ class LoggedVehicleDetails(LoggedVehicle):
     """A vehicle, and what its logs tell together."""
 
     combined: Annotated[CombinedVehicle | None, Field(description="null: fewer than two logs tell the vehicle")]
+
+
+class AtlasShape(Schema):
+    """A shape of failure in the atlas."""
+
+    code: FailureShape
+    title: str
+    recognised: Annotated[str, Field(description="how the program recognises it")]
+    advice: Annotated[str, Field(description="what to do")]
+    figures: Annotated[dict[ThemeName, Card], Field(description="of a simulated flight with it, by theme")]

@@ -23,7 +23,7 @@ PARAMETERS: Final[Mapping[str, float]] = {
 }
 
 _TOPICS: Final = (
-    ("vehicle_local_position", "float z;float vz;uint8_t z_reset_counter;uint8_t vz_reset_counter;", "ffBB"),
+    ("vehicle_local_position", "float z;float vz;uint8_t z_reset_counter;uint8_t vz_reset_counter;float az;", "ffBBf"),
     ("vehicle_local_position_setpoint", "float z;float vz;float[3] acceleration;float[3] thrust;", "8f"),
     ("vehicle_thrust_setpoint", "float[3] xyz;", "3f"),
     ("trajectory_setpoint", "float[3] position;float[3] velocity;float[3] acceleration;", "9f"),
@@ -72,7 +72,7 @@ def px4_log(
     for row, since_s in enumerate((segment.time_s - segment.time_s[0]).tolist()):
         at_s = _BEGIN_S + since_s
         moved = _latest(resets, since_s)
-        log.add("vehicle_local_position", at_s, -segment.z_m[row], -segment.v_m_s[row], moved, 0)
+        log.add("vehicle_local_position", at_s, -segment.z_m[row], -segment.v_m_s[row], moved, 0, -segment.a_m_s2[row])
         z_d = -segment.z_d_m[row] if has_altitude else _NONE
         vertical = (z_d, -segment.v_t_m_s[row], 0.0, 0.0, acceleration[row], tilt * thrust[row], 0.0, -thrust[row])
         log.add("vehicle_local_position_setpoint", at_s, *vertical)

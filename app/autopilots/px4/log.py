@@ -41,6 +41,7 @@ SOURCES: Final[Mapping[str, Source]] = {
     "altitude_m": Source(POSITION, "z", -1.0),
     "altitude_is_valid": _state(POSITION, "z_valid"),
     "climb_rate_m_s": Source(POSITION, "vz", -1.0),
+    "acceleration_m_s2": Source(POSITION, "az", -1.0),
     "altitude_derivative_m_s": Source(POSITION, "z_deriv", -1.0),
     "altitude_resets": _state(POSITION, "z_reset_counter"),
     "climb_rate_resets": _state(POSITION, "vz_reset_counter"),

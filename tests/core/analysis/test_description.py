@@ -32,6 +32,7 @@ def flight(*, rate_hz: float = 10.0, lasts_s: float = 60.0, seed: int = 1) -> Fl
         throttle=np.where(flown, 0.4 + 0.01 * noise + 0.1 * (time_s < 20.0), 0.0),
         flown=flown,
         held=time_s > 20.0,
+        sensed_m_s2=np.zeros_like(time_s),
     )
 
 
@@ -116,3 +117,12 @@ def test_what_is_not_known_is_not_told() -> None:
     assert found.flown_s > 60.0
     assert (found.hover_throttle, found.deviation_mean_m, found.saturated_share, found.oscillation) == (None,) * 4
     assert describe(replace(signals, flown=np.zeros_like(signals.flown))) is None
+
+
+def test_a_larger_transient_before_it_hides_no_oscillation() -> None:
+    """As of a takeoff or of the first step, which excites the same mode."""
+    time_s = np.arange(0.0, 60.0, 0.1)
+    wave = np.sin(2.0 * np.pi * 1.1 * time_s)
+    found = find_oscillation(time_s, (0.1 + 4.0 * np.exp(-2.0 * time_s)) * wave, np.zeros_like(time_s))
+    assert found is not None
+    assert (found.frequency_hz, found.amplitude_m) == pytest.approx((1.1, 0.1), rel=0.05)
