@@ -18,30 +18,12 @@ from app.core import formatting
 from app.core.definition import Interval
 from app.db.models import TrialPhotoRow
 from app.figures.base import Cell, Column
-from app.reports.service import Report
+from app.reports.service import WORDS, Report
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
-_OUTCOMES: Final = {
-    "converged": "Converged",
-    "budget": "Flight budget used",
-    "stopped": "Stopped",
-}
-_STATES: Final = {
-    "draft": "Not flown yet",
-    "ready": "Not flown yet",
-    "flying": "Campaign still open: a flight is in progress",
-    "deciding": "Campaign still open: between flights",
-    "finished": "Finished",
-    "archived": "Finished and archived",
-}
-_STANDINGS: Final = {
-    "candidate": "Candidate: not yet confirmed by repeat flights.",
-    "confirmed": "Confirmed: better than the first gains in repeat flights.",
-    "not confirmed": "Not confirmed: no improvement over the first gains in repeat flights.",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +50,7 @@ def render(report: Report, plotly: str) -> Document:
         .render(
             report=report,
             state=_state(report.campaign),
-            standing=_STANDINGS.get(report.campaign.standing or ""),
+            standing=WORDS["standings"].get(report.campaign.standing or ""),
             baseline=next((group for group in groups if group.is_baseline), None),
             winner=next((group for group in groups if group.is_best), None),
             policy=own,
@@ -102,8 +84,8 @@ def _state(campaign: Campaign) -> str:
     if campaign.state == "finished" and campaign.outcome == "converged" and campaign.verdict is None:
         return "No better gains found"
     if campaign.state == "finished" and campaign.outcome is not None:
-        return _OUTCOMES[campaign.outcome]
-    return _STATES[campaign.state]
+        return WORDS["outcomes"][campaign.outcome]
+    return WORDS["states"][campaign.state]
 
 
 def _script(source: str) -> Markup:
@@ -127,9 +109,6 @@ def _policy(*scripts: Markup) -> str:
     )
 
 
-_CHOICES: Final = {"manual": "custom gains", "shorter step": "smaller step"}
-
-
 def _environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -138,7 +117,7 @@ def _environment() -> "Environment":
     )
     environment.filters |= {
         "instant": _instant,
-        "choice": lambda kind: _CHOICES.get(kind, kind),
+        "choice": lambda kind: WORDS["choices"].get(kind, kind),
         "trial_state": state_label,
         "plus_minus": formatting.measured,
         "number": formatting.number,

@@ -3,10 +3,12 @@ campaign's frozen settings, anomalies in the order of the flights, notes and pho
 still be sent.
 """
 
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from pathlib import Path
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -20,7 +22,7 @@ from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.trials import service as trials_service
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
-from app.common.states import FLOWN_TRIAL_STATES, AbortCause
+from app.common.states import FLOWN_TRIAL_STATES
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
@@ -93,12 +95,8 @@ class Report:
     made_at: datetime
 
 
-_STARTS: Final = {
-    "default": "the vehicle's default gains",
-    "simplex": "best gains on the model (simplex)",
-    "given": "custom gains",
-    "campaign": "the best of another campaign",
-}
+WORDS: Final[Mapping[str, Mapping[str, str]]] = tomllib.loads((Path(__file__).parent / "words.toml").read_text("utf-8"))
+"""Words for values of the API, by kind."""
 
 
 def describe_vehicle(
@@ -162,7 +160,7 @@ def _options(chosen: Mapping[str, OptionValue], known: Iterable[Option]) -> Iter
 
 
 def _start(start: Start) -> str:
-    origin = _STARTS[start.kind]
+    origin = WORDS["starts"][start.kind]
     if start.donor is not None:
         origin = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
     if start.log is not None:
@@ -183,21 +181,14 @@ def _stop(stop: StopRule, open_until_flight: int) -> str:
     return rule if stop.min_battery_v is None else f"{rule}; or a flight that ends below {stop.min_battery_v:g} V"
 
 
-_ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
-_CAUSES: Final[Mapping[AbortCause, str]] = {
-    "limit": "(A limit was exceeded: it counts against the gains.)",
-    "operator": "(No cause was given. It does not count against the gains.)",
-    "behaved badly": "(Cause given by the operator: vehicle behaviour. It counts against the gains.)",
-    "something else": "(Cause given by the operator: something else. It does not count against the gains.)",
-}
-
-
 def flight_anomalies(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
-        if (kind := _ENDINGS.get(trial.state)) is not None:
+        if (kind := WORDS["endings"].get(trial.state)) is not None:
             reason = trial.given_reason or _end_beside(trial.state, trial.end) or "No reason was given."
-            counting = f" {_CAUSES[trial.abort_cause]}" if trial.state == "aborted" and trial.abort_cause else ""
+            counting = (
+                f" {WORDS['causes'][trial.abort_cause]}" if trial.state == "aborted" and trial.abort_cause else ""
+            )
             yield Anomaly(trial.number, kind, f"{reason}{counting}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
@@ -212,7 +203,7 @@ def flight_anomalies(trials: Iterable[Trial], error_unit: str) -> Iterator[Anoma
             repaired = f"Without the glitches the error would be {short(trial.repaired_error)} {error_unit}."
             yield Anomaly(trial.number, "Glitch in the record", repaired)
         if trial.flight is not None and trial.flight.problem and (trial.given_reason or not kind):
-            kind = _ENDINGS.get(trial.flight.state)
+            kind = WORDS["endings"].get(trial.flight.state)
             end = trial.flight.problem if kind is None else _end_beside(trial.flight.state, trial.flight.end)
             yield Anomaly(trial.number, kind or "Vehicle problem", end)
 
