@@ -23,7 +23,7 @@ from app.campaigns.trials import service as trials_service
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.states import FLOWN_TRIAL_STATES
-from app.core.definition import Option, OptionValue, with_defaults
+from app.core.definition import Option, OptionValue, titled, with_defaults
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
 from app.core.policy import Gain
@@ -104,16 +104,16 @@ def describe_vehicle(
 ) -> tuple[Fact, ...]:
     """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
     vehicle = campaign.vehicle
-    titled = [replace(each, title=each.label or each.title) for each in VEHICLE_KINDS[vehicle.kind].options]
+    known = [replace(each, title=each.label or each.title) for each in VEHICLE_KINDS[vehicle.kind].options]
     autopilot = vehicle.options.get("autopilot")
-    foreign = {each.name for each in titled if each.autopilots and autopilot not in each.autopilots}
+    foreign = {each.name for each in known if each.autopilots and autopilot not in each.autopilots}
     own = {name: value for name, value in vehicle.options.items() if name not in foreign}
     options = experiment.options
     return (
         Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})"),
         Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation"),
         *(() if identity is None else (Fact("Autopilot", _autopilot(identity)),)),
-        *_options(own, titled),
+        *_options(own, known),
         *((Fact("Safe gains", safe_gains),) if vehicle.can_fly else ()),
         Fact("Experiment", experiment.title),
         *_options(with_defaults(campaign.definition.experiment_options, options), options),
@@ -152,11 +152,8 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
 
 
 def _options(chosen: Mapping[str, OptionValue], known: Iterable[Option]) -> Iterator[Fact]:
-    titles = {each.name: (each.title, each.unit) for each in known}
-    for name, value in chosen.items():
-        if value != "":
-            title, unit = titles.get(name, (name, ""))
-            yield Fact(title, setting_text(value, unit))
+    described = titled(chosen, known)
+    return (Fact(title, setting_text(value, unit)) for title, unit, value in described if value != "")
 
 
 def _start(start: Start) -> str:
