@@ -47,9 +47,9 @@ class Reproduction:
                 return tables.run_table(self.name, figure, on_progress)
 
 
-_DESCRIBED: Final = tomllib.loads((Path(__file__).parent / "reproductions.toml").read_text("utf-8"))
 REPRODUCTIONS: Final[Mapping[str, Reproduction]] = {
-    name: Reproduction(name=name, **described) for name, described in _DESCRIBED.items()
+    name: Reproduction(name=name, **described)
+    for name, described in tomllib.loads((Path(__file__).parent / "reproductions.toml").read_text("utf-8")).items()
 }
 
 
