@@ -117,12 +117,9 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 
     Trials need not fly in the order of their numbers.
     """
-    flown = [
-        (row.flown_at, row.number, row)
-        for row in trials
-        if row.state in FLOWN_TRIAL_STATES and row.flown_at is not None
-    ]
-    return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
+    flown = (row for row in trials if row.state in FLOWN_TRIAL_STATES and row.flown_at is not None)
+    last = max(flown, key=lambda row: (row.flown_at, row.number), default=None)
+    return None if last is None else last.landing_battery_v
 
 
 def history_digest(session: Session, campaign: CampaignRow, definition: Definition, trials: Sequence[TrialRow]) -> str:
@@ -185,8 +182,8 @@ def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int,
 
 def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
     """The valid trial with the lowest error; the earliest one of equal errors."""
-    valid = [(row.error, row.number, row) for row in trials if row.state == TrialState.VALID and row.error is not None]
-    return min(valid, key=lambda found: found[:2])[2] if valid else None
+    valid = (row for row in trials if row.state == TrialState.VALID and row.error is not None)
+    return min(valid, key=lambda row: (row.error, row.number), default=None)
 
 
 def is_corrected(trials: Sequence[TrialRow], number: float = math.inf) -> bool:

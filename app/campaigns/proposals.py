@@ -119,13 +119,19 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
 
 def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalRow:
     """The latest proposal. Raises ConflictError when there is none for the present flights."""
-    row = repository.latest_proposal(session, campaign.id)
-    if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
+    if (row := _latest_fresh(session, campaign)) is None:
         raise ConflictError(
             f"The next gains of campaign {campaign.id} have not been computed yet.",
             hint="Wait until they are computed, then try again.",
         )
     return row
+
+
+def _latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow | None:
+    """The latest proposal, if it is for the present flights."""
+    row = repository.latest_proposal(session, campaign.id)
+    is_fresh = row is not None and not is_stale(session, campaign, row, history.trials_of(session, campaign.id))
+    return row if is_fresh else None
 
 
 def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
@@ -149,12 +155,8 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
 
     Raises ConflictError while they are not known.
     """
-    latest = repository.latest_proposal(session, campaign.id)
-    if (
-        latest is None
-        or latest.kind != "start"
-        or is_stale(session, campaign, latest, history.trials_of(session, campaign.id))
-    ):
+    latest = _latest_fresh(session, campaign)
+    if latest is None or latest.kind != "start":
         raise ConflictError(
             f"The start gains of campaign {campaign.id} have not been computed yet; the step limits of custom gains "
             "are measured from them.",

@@ -1,47 +1,18 @@
 """State machines as data: checks of transitions, actions and versions."""
 
+import tomllib
 from collections.abc import Iterable, Mapping, Set
 from enum import StrEnum
+from pathlib import Path
 from typing import Final, TypeVar
 
 from app.common.errors import ConflictError, Problem
 
 S = TypeVar("S", bound=StrEnum)
 
-_LABELS: Final[Mapping[str, str]] = {
-    "captured": "waiting for review",
-    "deciding": "between flights",
-    "draft": "in preparation",
-    "flying": "in flight",
-}
-"""States that a person knows by another word."""
-
-_REFUSALS: Final[Mapping[str, str]] = {
-    "archive": "cannot be archived",
-    "cancel": "cannot be cancelled",
-    "check": "cannot be checked",
-    "classify": "cannot be reviewed",
-    "connect": "cannot be connected",
-    "define": "cannot be changed",
-    "delete": "cannot be deleted",
-    "disconnect": "cannot be disconnected",
-    "edit": "cannot be edited",
-    "finish": "cannot be ended",
-    "fly": "cannot be flown",
-    "judge": "cannot be reviewed",
-    "judge abort": "has no abort to review",
-    "parameters": "cannot be asked for its parameters",
-    "plan": "cannot have another flight planned",
-    "propose": "cannot get a proposal",
-    "release": "cannot be released",
-    "reopen": "cannot be reopened",
-    "restore": "cannot be sent its safe gains",
-    "retry": "cannot be retried",
-    "stage": "cannot be staged",
-    "take-off": "cannot take off",
-    "unstage": "cannot be unstaged",
-    "upload": "cannot accept a record",
-}
+_WORDS: Final[Mapping[str, Mapping[str, str]]] = tomllib.loads(
+    (Path(__file__).parent / "state_words.toml").read_text("utf-8")
+)
 
 
 def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:
@@ -60,7 +31,7 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
     """Raise ConflictError when `action` is not possible in `state`."""
     if state not in actions[action]:
         raise ConflictError(
-            f"{what} {_REFUSALS[action]}: it is {state_label(state)}.",
+            f"{what} {_WORDS['refusals'][action]}: it is {state_label(state)}.",
             hint=f"This is possible only while it is {_or(actions[action])}. Reload it: its state has changed, or "
             "another step must come first.",
         )
@@ -100,7 +71,7 @@ def _short(value: object) -> str:
 
 def state_label(state: str) -> str:
     """The word that a person knows a state by."""
-    return _LABELS.get(state, state)
+    return _WORDS["labels"].get(state, state)
 
 
 def _or(states: Iterable[str], last_by: str = " or ", others_by: str = ", ") -> str:

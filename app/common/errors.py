@@ -22,27 +22,7 @@ GainlineError                 (app.core.errors)
 
 from app.core.errors import GainlineError, GainsError, InputError, Problem, TrajectoryError
 
-__all__ = [
-    "AddressError",
-    "AlreadyRunningError",
-    "BusyError",
-    "ConflictError",
-    "ForeignRequestError",
-    "GainlineError",
-    "GainsError",
-    "InputError",
-    "KeyReusedError",
-    "MediaTypeError",
-    "NotAllowedError",
-    "NotFoundError",
-    "Problem",
-    "SchemaError",
-    "StorageError",
-    "TooLargeError",
-    "TrajectoryError",
-    "UnavailableError",
-    "UnconfirmedError",
-]
+__all__ = ["GainlineError", "GainsError", "InputError", "Problem", "TrajectoryError"]
 
 
 class UnconfirmedError(InputError):

@@ -27,7 +27,7 @@ from app.compare.schemas import (
     FlightSetting,
     FurtherFlights,
 )
-from app.core.definition import Option, with_defaults
+from app.core.definition import Option, titled, with_defaults
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import CHANNEL_UNITS, Samples
 from app.core.statistics.comparisons import groups_of, pool_scatter
@@ -331,9 +331,7 @@ def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference
 
 
 def _options(values: Mapping[str, OptionValue], known: Iterable[Option]) -> list[FlightSetting]:
-    described = {option.name: (option.title, option.unit) for option in known}
-    titled = ((*described.get(name, (name, "")), value) for name, value in values.items())
-    return [FlightSetting(title=title, unit=unit, value=value) for title, unit, value in titled]
+    return [FlightSetting(title=title, unit=unit, value=value) for title, unit, value in titled(values, known)]
 
 
 def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> list[FlightDifference]:

@@ -4,7 +4,7 @@ and experiments with their validation, and queries of the flight history.
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
@@ -204,6 +204,12 @@ def problems_of_options(
 def with_defaults(chosen: Mapping[str, OptionValue], offered: Sequence[Option]) -> dict[str, OptionValue]:
     """Every setting: the chosen value, else the default."""
     return {option.name: chosen.get(option.name, option.default) for option in offered}
+
+
+def titled(chosen: Mapping[str, OptionValue], offered: Iterable[Option]) -> Iterator[tuple[str, str, OptionValue]]:
+    """Title, unit and value of each chosen setting; one that is not offered has its name as its title."""
+    described = {option.name: (option.title, option.unit) for option in offered}
+    return ((*described.get(name, (name, "")), value) for name, value in chosen.items())
 
 
 def best_flight(flights: Sequence[Flight]) -> Flight:

@@ -3,42 +3,14 @@
 Nothing else reads words. What is not recognised stays as it was.
 """
 
+import csv
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Final
 
-_FAILURES: Final[Mapping[str, str]] = {
-    "No heartbeat was received; nothing was sent.": "F1",
-    "The vehicle did not confirm its gains; it was not armed.": "F2",
-    "The vehicle did not arm.": "F3",
-    "The vehicle did not lift off.": "F4a",
-    "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe or "
-    "flight plan lands it.": "F5",
-    "A safety limit was exceeded.": "F6",
-    "The vehicle's position froze while packets still arrived.": "F9a",
-    "Too many samples had to be dropped.": "F9b",
-    "Two sources of altitude disagree.": "F9c",
-    "The vehicle's position was lost.": "F9d",
-    "The vehicle's clock is slower than the clock speed in its settings.": "F9e",
-    "A pilot took manual control; no further commands were sent.": "F10a",
-    "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.": "F10b",
-    "The flight may have been interrupted.": "F10c",
-    "The vehicle began to land by itself.": "F11",
-    "Two vehicles use the same system id. Both were commanded to land; their motors were not stopped.": "F12",
-    "The vehicle fell.": "F13",
-    "The vehicle did not confirm a new set point.": "F14a",
-    "The steps were not flown.": "F14b",
-    "The set points paused.": "F14c",
-    "A safety limit was met.": "F6",
-    "A person may have flown the vehicle for a moment.": "F10c",
-    "Somebody took the vehicle over by hand; it was left alone.": "F10a",
-    "The link was lost in the air; Land was repeated, the vehicle's own failsafe decides.": "F5",
-    "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.": "F10b",
-    "The vehicle would not arm.": "F3",
-    "The vehicle's clock goes slower than its clock_speed says.": "F9e",
-    "The vehicle's position stood still while it went on talking.": "F9a",
-    "Two vehicles speak under one system id; both were told to land, and no motors were stopped.": "F12",
-}
+with (Path(__file__).parent / "earlier_failures.csv").open(encoding="utf-8", newline="") as _rows:
+    _FAILURES: Final = {row["begin"]: row["failure"] for row in csv.DictReader(_rows)}
 """How a reason begins, and the number of its failure, the first if several have the sentence: in the words of 0.3.0,
 then of 0.2.0."""
 ORIGINS: Final[Mapping[str, str]] = {

@@ -75,15 +75,14 @@ def _ledger_lines(session: Session, vehicle: VehicleRow, lines: Sequence[Row[Any
     acts = repository.rows_by_id(
         session, VehicleActRow, [line.id // 2 for line in lines if line.kind not in of_flights]
     )
-    items = []
-    for line in lines:
-        if line.kind == "flight":
-            items.append(_of_flight(flights[line.id // 2]))
-        elif line.kind == repository.RESTORE_AFTER_FLIGHT:
-            items.append(_of_restoring(vehicle, flights[line.id // 2]))
-        else:
-            items.append(_of_act(acts[line.id // 2]))
-    return items
+    return [
+        _of_flight(flights[line.id // 2])
+        if line.kind == "flight"
+        else _of_restoring(vehicle, flights[line.id // 2])
+        if line.kind == repository.RESTORE_AFTER_FLIGHT
+        else _of_act(acts[line.id // 2])
+        for line in lines
+    ]
 
 
 def _of_flight(row: FlightRow) -> GivenGains:

@@ -6,11 +6,13 @@ Before takeoff a loss takes steps back: what was reached no longer holds, and th
 was taken. In flight a loss takes nothing back, but tells the operator what the vehicle does now.
 """
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
 from app.common.errors import ConflictError
 from app.common.schemas import Schema
@@ -38,7 +40,7 @@ LossKind = Literal[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LossText:
-    """What a loss means and the way on, on the ground and in flight. `keeps` is the last step that it leaves.
+    """What a loss means and the way on, on the ground and in flight. `keeps` are the steps that it leaves.
 
     `way_on_planned`: the way on for a flight that is not staged, `way_on_watching` for a client that may not command
     the vehicle; both are `way_on` where they are empty.
@@ -50,76 +52,13 @@ class LossText:
     way_on_watching: str = ""
     what_in_flight: str = ""
     way_on_in_flight: str = ""
-    keeps: ReadinessStep | None = "control"
+    keeps: Steps = ("control",)
 
 
-LOSSES: Final[Mapping[LossKind, LossText]] = {
-    "worker away": LossText(
-        what="The worker is not responding. No commands can be sent.",
-        way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
-        "with `gainline worker`. Then stage the flight again.",
-        way_on_planned="Gainline restarts its own worker within seconds. If the worker runs separately, start it "
-        "again with `gainline worker`.",
-        what_in_flight="The worker is not responding.",
-        way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
-        "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
-    ),
-    "not connected": LossText(
-        what="The vehicle is not connected.",
-        way_on="Connect it on its page, then stage the flight.",
-        what_in_flight="Gainline's connection to the vehicle has ended.",
-        way_on_in_flight="Use the vehicle's own remote control.",
-    ),
-    "process silent": LossText(
-        what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
-        way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
-        way_on_planned="Wait until it responds. If it does not, restart the worker.",
-        what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
-        way_on_in_flight="Use the vehicle's own remote control.",
-    ),
-    "link silent": LossText(
-        what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-        way_on="Check its power and its radio. It is ready again once its gains have been read back.",
-        way_on_planned="Check its power and its radio.",
-        what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-        way_on_in_flight="Land is repeated until the vehicle descends. If it does not descend, use its own remote "
-        "control.",
-    ),
-    "gains unknown": LossText(
-        what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
-        way_on="Stage the flight again.",
-        way_on_planned="Select Check now on its page, or stage the flight.",
-    ),
-    "battery low": LossText(
-        what="The battery voltage is below the vehicle's minimum.",
-        way_on="Insert a charged battery, then stage the flight again.",
-        way_on_planned="Insert a charged battery, then stage the flight.",
-        keeps="staged",
-    ),
-    "checks failed": LossText(
-        what="A preflight check has failed.",
-        way_on="Unstage the flight, correct the failed item, then select Check now on the vehicle's page.",
-        way_on_planned="Correct the failed item, then select Check now on the vehicle's page.",
-        keeps="staged",
-    ),
-    "quarantined": LossText(
-        what="The vehicle is quarantined.",
-        way_on="Inspect it, then release it on its page.",
-        keeps=None,
-    ),
-    "control ended": LossText(
-        what="You are not in control of the vehicle.",
-        way_on="Take control.",
-        way_on_watching="Only its operator can start the takeoff.",
-        keeps=None,
-    ),
-    "controlled by other": LossText(
-        what="Another operator is in control of the vehicle.",
-        way_on="Only that operator can start the takeoff. To start it yourself, take over.",
-        way_on_watching="Only that operator can start the takeoff.",
-        keeps="held",
-    ),
-}
+LOSSES: Final = TypeAdapter(dict[str, LossText]).validate_python(
+    tomllib.loads((Path(__file__).parent / "losses.toml").read_text("utf-8").format(silent_s=SILENT_AFTER_S))
+)
+"""By the kind of loss, and that of the worker of a vehicle without a link."""
 
 _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = {
     TrialState.PLANNED: "control",
@@ -135,13 +74,6 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = {
 _IN_FLIGHT: Final = STEPS.index("in flight")
 _BEGINS_WITHIN_S: Final = 3.0
 """A vehicle on the ground this long after the takeoff was requested has not taken off yet; later it has landed."""
-_WITHOUT_LINK: Final = LossText(
-    what="The worker is not responding. Nothing can be flown.",
-    way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again with "
-    "`gainline worker`.",
-    what_in_flight="The worker is not responding.",
-    way_on_in_flight="If the worker has stopped, the simulated flight is lost.",
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,7 +150,7 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Ste
     if len(steps) > _IN_FLIGHT + 1 or not steps:
         return steps, (), ()
     kinds = _losses(standing, report)
-    texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
+    texts = LOSSES if standing.has_link else {**LOSSES, "worker away": LOSSES["worker away without link"]}
     if len(steps) > _IN_FLIGHT:
         in_flight = tuple(
             Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
@@ -228,8 +160,7 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> tuple[Steps, Ste
         return STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1], (), in_flight
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
-    keeps = [texts[kind].keeps for kind in kinds]
-    kept = min((0 if step is None else STEPS.index(step) + 1 for step in keeps), default=len(steps))
+    kept = min((len(texts[kind].keeps) for kind in kinds), default=len(steps))
     losses = tuple(
         Loss(kind=kind, what=_what(kind, texts, standing), way_on=_way_on(texts[kind], standing)) for kind in kinds
     )
@@ -256,7 +187,7 @@ _ENDED_BY_RELEASE: Final = frozenset({"not connected", "gains unknown"})
 """A release needs the connection, and reads the gains back."""
 
 
-def _what(kind: LossKind, texts: Mapping[LossKind, LossText], standing: Standing) -> str:
+def _what(kind: LossKind, texts: Mapping[str, LossText], standing: Standing) -> str:
     what = texts[kind].what
     return f"{what.removesuffix('.')}: {', '.join(standing.failed_checks)}." if kind == "checks failed" else what
 

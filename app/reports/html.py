@@ -14,27 +14,9 @@ from app.core.definition import Interval
 from app.db.models import TrialPhotoRow
 from app.documents import html
 from app.documents.html import Document
-from app.reports.service import Report
+from app.reports.service import WORDS, Report
 
 _TEMPLATE: Final = Path(__file__).parent / "templates" / "report.html.j2"
-_OUTCOMES: Final = {
-    "converged": "Converged",
-    "budget": "Flight budget used",
-    "stopped": "Stopped",
-}
-_STATES: Final = {
-    "draft": "Not flown yet",
-    "ready": "Not flown yet",
-    "flying": "Campaign still open: a flight is in progress",
-    "deciding": "Campaign still open: between flights",
-    "finished": "Finished",
-    "archived": "Finished and archived",
-}
-_STANDINGS: Final = {
-    "candidate": "Candidate: not yet confirmed by repeat flights.",
-    "confirmed": "Confirmed: better than the first gains in repeat flights.",
-    "not confirmed": "Not confirmed: no improvement over the first gains in repeat flights.",
-}
 
 
 def render(report: Report, plotly: str) -> Document:
@@ -43,7 +25,7 @@ def render(report: Report, plotly: str) -> Document:
     content = {
         "report": report,
         "state": _state(report.campaign),
-        "standing": _STANDINGS.get(report.campaign.standing or ""),
+        "standing": WORDS["standings"].get(report.campaign.standing or ""),
         "baseline": next((group for group in groups if group.is_baseline), None),
         "winner": next((group for group in groups if group.is_best), None),
     }
@@ -59,11 +41,8 @@ def _state(campaign: Campaign) -> str:
     if campaign.state == "finished" and campaign.outcome == "converged" and campaign.verdict is None:
         return "No better gains found"
     if campaign.state == "finished" and campaign.outcome is not None:
-        return _OUTCOMES[campaign.outcome]
-    return _STATES[campaign.state]
-
-
-_CHOICES: Final = {"manual": "custom gains", "shorter step": "smaller step"}
+        return WORDS["outcomes"][campaign.outcome]
+    return WORDS["states"][campaign.state]
 
 
 def _interval(span: Interval | None) -> str:
@@ -82,7 +61,7 @@ def _data_uri(photo: TrialPhotoRow) -> Markup:
 
 
 _FILTERS: Final[html.Filters] = {
-    "choice": lambda kind: _CHOICES.get(kind, kind),
+    "choice": lambda kind: WORDS["choices"].get(kind, kind),
     "trial_state": state_label,
     "plus_minus": formatting.measured,
     "short": formatting.short,

@@ -3,10 +3,12 @@ campaign's frozen settings, anomalies in the order of the flights, notes and pho
 still be sent.
 """
 
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from pathlib import Path
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -20,8 +22,8 @@ from app.campaigns.statistics import CampaignStatistics, campaign_statistics
 from app.campaigns.trials import service as trials_service
 from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
-from app.common.states import FLOWN_TRIAL_STATES, AbortCause
-from app.core.definition import Option, OptionValue, with_defaults
+from app.common.states import FLOWN_TRIAL_STATES
+from app.core.definition import Option, OptionValue, titled, with_defaults
 from app.core.experiments.base import Experiment
 from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent
 from app.core.policy import Gain
@@ -93,12 +95,8 @@ class Report:
     made_at: datetime
 
 
-_STARTS: Final = {
-    "default": "the vehicle's default gains",
-    "simplex": "best gains on the model (simplex)",
-    "given": "custom gains",
-    "campaign": "the best of another campaign",
-}
+WORDS: Final[Mapping[str, Mapping[str, str]]] = tomllib.loads((Path(__file__).parent / "words.toml").read_text("utf-8"))
+"""Words for values of the API, by kind."""
 
 
 def describe_vehicle(
@@ -106,16 +104,16 @@ def describe_vehicle(
 ) -> tuple[Fact, ...]:
     """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
     vehicle = campaign.vehicle
-    titled = [replace(each, title=each.label or each.title) for each in VEHICLE_KINDS[vehicle.kind].options]
+    known = [replace(each, title=each.label or each.title) for each in VEHICLE_KINDS[vehicle.kind].options]
     autopilot = vehicle.options.get("autopilot")
-    foreign = {each.name for each in titled if each.autopilots and autopilot not in each.autopilots}
+    foreign = {each.name for each in known if each.autopilots and autopilot not in each.autopilots}
     own = {name: value for name, value in vehicle.options.items() if name not in foreign}
     options = experiment.options
     return (
         Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})"),
         Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation"),
         *(() if identity is None else (Fact("Autopilot", _autopilot(identity)),)),
-        *_options(own, titled),
+        *_options(own, known),
         *((Fact("Safe gains", safe_gains),) if vehicle.can_fly else ()),
         Fact("Experiment", experiment.title),
         *_options(with_defaults(campaign.definition.experiment_options, options), options),
@@ -154,15 +152,12 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
 
 
 def _options(chosen: Mapping[str, OptionValue], known: Iterable[Option]) -> Iterator[Fact]:
-    titles = {each.name: (each.title, each.unit) for each in known}
-    for name, value in chosen.items():
-        if value != "":
-            title, unit = titles.get(name, (name, ""))
-            yield Fact(title, setting_text(value, unit))
+    described = titled(chosen, known)
+    return (Fact(title, setting_text(value, unit)) for title, unit, value in described if value != "")
 
 
 def _start(start: Start) -> str:
-    origin = _STARTS[start.kind]
+    origin = WORDS["starts"][start.kind]
     if start.donor is not None:
         origin = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
     if start.log is not None:
@@ -183,21 +178,14 @@ def _stop(stop: StopRule, open_until_flight: int) -> str:
     return rule if stop.min_battery_v is None else f"{rule}; or a flight that ends below {stop.min_battery_v:g} V"
 
 
-_ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
-_CAUSES: Final[Mapping[AbortCause, str]] = {
-    "limit": "(A limit was exceeded: it counts against the gains.)",
-    "operator": "(No cause was given. It does not count against the gains.)",
-    "behaved badly": "(Cause given by the operator: vehicle behaviour. It counts against the gains.)",
-    "something else": "(Cause given by the operator: something else. It does not count against the gains.)",
-}
-
-
 def flight_anomalies(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
-        if (kind := _ENDINGS.get(trial.state)) is not None:
+        if (kind := WORDS["endings"].get(trial.state)) is not None:
             reason = trial.given_reason or _end_beside(trial.state, trial.end) or "No reason was given."
-            counting = f" {_CAUSES[trial.abort_cause]}" if trial.state == "aborted" and trial.abort_cause else ""
+            counting = (
+                f" {WORDS['causes'][trial.abort_cause]}" if trial.state == "aborted" and trial.abort_cause else ""
+            )
             yield Anomaly(trial.number, kind, f"{reason}{counting}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
@@ -212,7 +200,7 @@ def flight_anomalies(trials: Iterable[Trial], error_unit: str) -> Iterator[Anoma
             repaired = f"Without the glitches the error would be {short(trial.repaired_error)} {error_unit}."
             yield Anomaly(trial.number, "Glitch in the record", repaired)
         if trial.flight is not None and trial.flight.problem and (trial.given_reason or not kind):
-            kind = _ENDINGS.get(trial.flight.state)
+            kind = WORDS["endings"].get(trial.flight.state)
             end = trial.flight.problem if kind is None else _end_beside(trial.flight.state, trial.flight.end)
             yield Anomaly(trial.number, kind or "Vehicle problem", end)
 

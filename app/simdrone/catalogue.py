@@ -59,18 +59,11 @@ class _Flight:
         self.simulation.autopilot[Z_SUM_ERR] = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Airframe:
-    """A vehicle kind whose simulation a drone can fly; `flight` creates it from options and seed."""
-
-    kind: VehicleKind
-    flight: Callable[[dict[str, float], int], Simulated]
-
-
-AIRFRAMES: Final[Mapping[str, Airframe]] = {
-    "jsbsim": Airframe(JSBSIM, JsbsimFlight),
-    "twin": Airframe(TWIN, TwinFlight),
+AIRFRAMES: Final[Mapping[str, tuple[VehicleKind, Callable[[dict[str, float], int], Simulated]]]] = {
+    "jsbsim": (JSBSIM, JsbsimFlight),
+    "twin": (TWIN, TwinFlight),
 }
+"""The vehicle kinds whose simulations a drone can fly, and what begins a flight of theirs from options and seed."""
 
 
 def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> Body:
@@ -81,7 +74,7 @@ def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> 
             problems=(Problem("vehicle", f"must be one of {', '.join(AIRFRAMES)}, got {vehicle!r}"),),
             hint="jsbsim has six degrees of freedom; twin is a simple model with the real flights' scatter.",
         )
-    airframe = AIRFRAMES[vehicle]
-    numbers = {name: float(value) for name, value in airframe.kind.check(options, field="vehicle").items()}
-    _Flight(airframe.flight(numbers, seed)).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
-    return Body(lambda flight_seed: _Flight(airframe.flight(numbers, flight_seed)), seed=seed)
+    kind, flight = AIRFRAMES[vehicle]
+    numbers = {name: float(value) for name, value in kind.check(options, field="vehicle").items()}
+    _Flight(flight(numbers, seed)).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
+    return Body(lambda flight_seed: _Flight(flight(numbers, flight_seed)), seed=seed)

@@ -2,9 +2,11 @@
 its codes where somebody reads them. No decision reads a sentence.
 """
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Final
 
 
@@ -107,30 +109,8 @@ def withdrawn_by(request: StopRequest) -> FlightEnd:
 # ---- sentences
 
 FAILURE_TEXTS: Final[Mapping[Failure, str]] = {
-    Failure.NO_HEARTBEAT: "No heartbeat was received; nothing was sent.",
-    Failure.PARAMETER: "The vehicle did not confirm its gains; it was not armed.",
-    Failure.NOT_ARMED: "The vehicle did not arm.",
-    Failure.NO_LIFT_OFF: "The vehicle did not lift off.",
-    Failure.TAKE_OFF_REFUSED: "The vehicle did not lift off.",
-    Failure.LINK: "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe "
-    "or flight plan lands it.",
-    Failure.ENVELOPE: "A safety limit was exceeded.",
-    Failure.FROZEN: "The vehicle's position froze while packets still arrived.",
-    Failure.GLITCHES: "Too many samples had to be dropped.",
-    Failure.DISAGREEMENT: "Two sources of altitude disagree.",
-    Failure.LOST_POSITION: "The vehicle's position was lost.",
-    Failure.SLOW_CLOCK: "The vehicle's clock is slower than the clock speed in its settings.",
-    Failure.TAKEN_OVER: "A pilot took manual control; no further commands were sent.",
-    Failure.UNEXPECTED: "The vehicle changed its state without a command. It was commanded to land; its motors "
-    "were not stopped.",
-    Failure.INTERRUPTED: "The flight may have been interrupted.",
-    Failure.OWN_LANDING: "The vehicle began to land by itself.",
-    Failure.DUPLICATE: "Two vehicles use the same system id. Both were commanded to land; their motors were not "
-    "stopped.",
-    Failure.FALL: "The vehicle fell.",
-    Failure.SET_POINT: "The vehicle did not confirm a new set point.",
-    Failure.NOT_SETTLED: "The steps were not flown.",
-    Failure.PAUSED: "The set points paused.",
+    Failure(number): text
+    for number, text in tomllib.loads((Path(__file__).parent / "failures.toml").read_text("utf-8")).items()
 }
 """What each failure means. The remarks alone explain a low battery, and a request itself."""
 

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.definition import Definition, flight_seed
+from app.core.definition import Definition, Option, flight_seed, titled
 
 
 def test_the_digest_changes_with_every_field_and_only_then() -> None:
@@ -39,3 +39,8 @@ def test_flight_seeds_repeat_and_are_32_bit(seed: int, number: int) -> None:
 def test_flight_seeds_differ_between_flights_and_campaigns() -> None:
     seeds = {flight_seed(seed, number) for seed in range(20) for number in range(1, 21)}
     assert len(seeds) == 400
+
+
+def test_a_setting_has_the_title_and_unit_of_its_option_or_its_own_name() -> None:
+    height = Option("height_m", "Height", 3.0, "m", 2.5, 10.0)
+    assert list(titled({"height_m": 4.0, "former": 1}, [height])) == [("Height", "m", 4.0), ("former", "", 1)]

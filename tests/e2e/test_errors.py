@@ -309,7 +309,7 @@ TITLES: Final = {
 
 def answered_kinds() -> set[type[GainlineError] | str]:
     """What the API can answer, as the program itself says: a class of errors that is new needs a story here."""
-    declared = {getattr(app.common.errors, name) for name in app.common.errors.__all__}
+    declared = vars(app.common.errors).values()
     classes = {one for one in declared if isinstance(one, type) and issubclass(one, GainlineError)}
     return (classes - AT_START) | set(over_http._KINDS) | set(map(str, over_http._HTTP)) | set(FRAMEWORK)
 

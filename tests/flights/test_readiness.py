@@ -122,7 +122,7 @@ def test_before_take_off_a_loss_takes_steps_back_and_refuses_the_take_off(name: 
     state, flags, reached = REACHED[name]
     report, vehicle, kind = REPORTS[loss]
     found = readiness_of(standing(state, flags, vehicle), report)
-    kept = up_to(LOSSES[kind].keeps)
+    kept = LOSSES[kind].keeps
     assert found.steps == kept[: len(up_to(reached))]
     assert found.steps + found.lost == up_to(reached)
     text = LOSSES[kind]

@@ -7,6 +7,7 @@ takeoff and targets of position; the S-curves of GUID_OPTIONS bit 6 and targets 
 import contextlib
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar, Final
 
@@ -23,6 +24,7 @@ from app.autopilots.simulated.copter_parameters import (
     Kind,
     Parameter,
     Reaction,
+    read_parameters,
     real,
 )
 from app.core.errors import InputError
@@ -40,24 +42,10 @@ _HOVER_THROTTLE: Final = 0.55
 """MOT_THST_HOVER as set up, somewhat too low: these vehicles hover at 0.61 to 0.63, and learn it."""
 
 _COMMON: Final = (
-    Parameter("ARMING_CHECK", Kind.INT32, 1),
-    Parameter("DISARM_DELAY", Kind.INT8, 10),
-    Parameter("FS_EKF_ACTION", Kind.INT8, 1),
-    Parameter("FS_GCS_ENABLE", Kind.INT8, 0),
-    real("FS_GCS_TIMEOUT", 5.0),
-    Parameter("FENCE_ENABLE", Kind.INT8, 0),
-    Parameter("FENCE_TYPE", Kind.INT8, 7),
-    Parameter("FENCE_ACTION", Kind.INT8, 1),
-    real("FENCE_ALT_MAX", 100.0),
-    Parameter("LAND_SPEED", Kind.INT16, 50),
-    Parameter("GUID_OPTIONS", Kind.INT32, 0),
+    *read_parameters(Path(__file__).parent / "simulated_parameters.csv"),
     Parameter(loop.LOOP_RATE, Kind.INT16, LOOP_HZ),
-    Parameter("MOT_HOVER_LEARN", Kind.INT8, 2),
-    real("MOT_SPOOL_TIME", 0.5),
     real(loop.ACCELEROMETER_FILTER, loop.ACCELEROMETER_FILTER_HZ),
 )
-
-
 _DEFAULTS: Final = loop.Parameters(hover_throttle=_HOVER_THROTTLE).named | dict.fromkeys(loop.UNSUPPORTED, 0.0)
 """Parameters of the vertical loop, by their names until 4.6, with the firmware's defaults."""
 

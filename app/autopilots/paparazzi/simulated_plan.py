@@ -4,14 +4,13 @@ order, with their values after the start.
 Setting names are the C variables' truncated to 16 characters; a name of 16 characters is never found by a request.
 """
 
-import csv
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Final
 
-from app.autopilots.simulated.copter_parameters import Kind, Parameter, Parameters
+from app.autopilots.simulated.copter_parameters import Kind, Parameters, read_parameters
 from app.core.control.vertical_guidance import INT32_MAX, INT32_MIN
 
 DESCENT_M_S: Final = 0.8
@@ -138,12 +137,6 @@ def held(kind: Kind, value: float) -> float:
 def settings(kill_setting: str) -> Parameters:
     """Return the settings with their values after the start; `kill_setting` is this release's name of the one that
     stops the throttle, empty if there is none."""
-    with (Path(__file__).parent / "simulated_settings.csv").open(encoding="ascii", newline="") as file:
-        rows = [(row["name"], row["default"]) for row in csv.DictReader(file)]
-    named = ((kill_setting if name == KILL_SETTING else name, default) for name, default in rows)
-    return Parameters([_setting(*row) for row in named if row[0]], longest_name=NAME_LIMIT - 1)
-
-
-def _setting(name: str, default: str) -> Parameter:
-    """A setting; a default without a decimal point marks an integer in the autopilot, to which values are truncated."""
-    return Parameter(name, Kind.REAL32 if "." in default else Kind.INT32, float(default))
+    known = read_parameters(Path(__file__).parent / "simulated_settings.csv")
+    named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in known)
+    return Parameters([each for each in named if each.name], longest_name=NAME_LIMIT - 1)

@@ -7,6 +7,7 @@ position, velocity and acceleration, of which only the vertical parts act.
 import contextlib
 import math
 import struct
+from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar, Final
 
@@ -21,9 +22,8 @@ from app.autopilots.simulated.copter_parameters import (
     Behaviour,
     FirmwareProfile,
     FlightMode,
-    Kind,
-    Parameter,
     Reaction,
+    read_parameters,
     real,
 )
 from app.autopilots.simulated.copter_telemetry import HOME_AMSL_M
@@ -71,28 +71,7 @@ class Px4(Copter):
         parameters=(
             *(real(name, value) for name, value in loop.DEFAULTS.items()),
             *(real(name, 0.0) for name in loop.UNSUPPORTED),
-            real("MPC_TKO_SPEED", 1.5),
-            real("MPC_Z_V_AUTO_UP", 3.0),
-            real("MPC_Z_V_AUTO_DN", 1.5),
-            real("MPC_ACC_UP_MAX", 4.0),
-            real("MPC_ACC_DOWN_MAX", 3.0),
-            real("MPC_JERK_AUTO", 4.0),
-            real("HTE_HT_ERR_INIT", 0.1),
-            real("HTE_HT_NOISE", 0.0036),
-            real("HTE_ACC_GATE", 3.0),
-            real("HTE_THR_RANGE", 0.2),
-            real("HTE_VZ_THR", 2.0),
-            real("COM_OF_LOSS_T", 1.0),
-            Parameter("COM_OBL_RC_ACT", Kind.INT32, 0),
-            real("MIS_TAKEOFF_ALT", 2.5),
-            Parameter("NAV_DLL_ACT", Kind.INT32, 0),
-            Parameter("COM_DL_LOSS_T", Kind.INT32, 10),
-            real("COM_DISARM_PRFLT", 10.0),
-            Parameter("GF_ACTION", Kind.INT32, 2),
-            real("GF_MAX_VER_DIST", 0.0),
-            real("GF_MAX_HOR_DIST", 0.0),
-            Parameter("MAV_SYS_ID", Kind.INT32, 1),
-            Parameter("SYS_AUTOSTART", Kind.INT32, 4001),
+            *read_parameters(Path(__file__).parent / "simulated_parameters.csv"),
         ),
         is_bytewise=True,
         periods_s=MappingProxyType(

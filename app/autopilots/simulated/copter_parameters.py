@@ -2,11 +2,13 @@
 two differ: modes, rates, texts.
 """
 
+import csv
 import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from pathlib import Path
 
 from app.autopilots.dialects import Dialect
 
@@ -31,6 +33,12 @@ class Parameter:
 
 def real(name: str, default: float) -> Parameter:
     return Parameter(name, Kind.REAL32, default)
+
+
+def read_parameters(file: Path) -> tuple[Parameter, ...]:
+    """Read parameters from a table with the columns `name`, `kind` and `default`."""
+    with file.open(encoding="ascii", newline="") as rows:
+        return tuple(Parameter(row["name"], Kind[row["kind"]], float(row["default"])) for row in csv.DictReader(rows))
 
 
 class Parameters:

@@ -90,6 +90,10 @@ class Group:
     def standard_error(self, scatter: PooledScatter) -> float:
         return scatter.sigma / sqrt(self.size)
 
+    def pessimistic(self, scatter: PooledScatter) -> float:
+        """Mean plus standard error, by which policies are ranked."""
+        return self.mean + self.standard_error(scatter)
+
     def known_error(self, scatter: PooledScatter) -> float | None:
         """The standard error; None while the scatter is not known, and if there is none."""
         return None if scatter.reported is None else self.standard_error(scatter)
@@ -186,7 +190,7 @@ def select_winner(groups: Sequence[Group], scatter: PooledScatter) -> Group:
     A single lucky flight thus does not overtake a policy that has repeated the same error. There must be at least one
     group.
     """
-    return min(groups, key=lambda group: (group.mean + group.standard_error(scatter), group.numbers[0]))
+    return min(groups, key=lambda group: (group.pessimistic(scatter), group.numbers[0]))
 
 
 def compare(

@@ -64,11 +64,6 @@ class Side:
         """The name at the beginning of a sentence."""
         return capitalised(self.name)
 
-    @property
-    def standing(self) -> float:
-        """Mean plus standard error, by which flights are ranked; infinite without an error that counts."""
-        return math.inf if self.group is None else self.group.mean + self.group.standard_error(self.scatter)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairVerdict:
@@ -101,9 +96,10 @@ class LeadingPair:
 
 def find_leading_pair(sides: Sequence[Side]) -> LeadingPair | None:
     """None if fewer than two flights have an error that counts."""
-    ranked = sorted((side for side in sides if side.group is not None), key=lambda side: side.standing)
-    if len(ranked) < 2:
+    counted = [(side.group.pessimistic(side.scatter), place) for place, side in enumerate(sides) if side.group]
+    if len(counted) < 2:
         return None
+    ranked = [sides[place] for _, place in sorted(counted)]
     best, first = ranked[0], sides[0]
     other = (
         first

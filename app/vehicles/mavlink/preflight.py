@@ -3,7 +3,9 @@
 Each check results in an item; the items shown to the operator are the ones that refuse a flight.
 """
 
+import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 from app.autopilots import commands
@@ -37,6 +39,7 @@ POSITIONS_HZ: Final = 40.0
 LOST_SHARE: Final = 0.2
 """Greatest share of the vehicle's positions that may be lost, whatever their rate."""
 SECONDARY_HZ: Final = 10.0
+_TEXTS: Final = tomllib.loads((Path(__file__).parent / "checks.toml").read_text("utf-8"))
 _DISARMED: Final = "disarmed"
 _NO_POSITION: Final = "Wait until it has a position (GPS, cameras or its own sensors), then check again."
 
@@ -49,20 +52,14 @@ def evaluate_items(
         _heartbeat(radio),
         _single_vehicle(radio),
         _item(
-            _DISARMED,
-            "Motors",
-            not radio.reports_armed,
-            "armed" if radio.reports_armed else "disarmed",
-            "disarmed",
-            LAND_FIRST,
+            _DISARMED, not radio.reports_armed, "armed" if radio.reports_armed else "disarmed", "disarmed", LAND_FIRST
         ),
         *_motion(watched, find_reception(radio.seen.positions, radio.clock.now_s())),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
     if radio.profile.flying_blocks:
         blocks = "blocks for takeoff and landing"
-        hint = "Load a flight plan with these blocks (docs/real-flight.md), then connect again."
-        plan = _item("flight_plan", "Flight plan", not plan_problem, plan_problem or blocks, blocks, hint)
+        plan = _item("flight_plan", not plan_problem, plan_problem or blocks, blocks)
         items += [plan, _ground_reference(radio, watched)]
     if radio.profile.stop_settings:
         items.append(_stopping(radio))
@@ -77,27 +74,13 @@ def evaluate_secondary(secondary: AltitudeSource, watched: GroundObservation) ->
     rate_hz = len(watched.secondary_m) / watched.seconds
     rate = f"{rate_hz:.0f} samples per second of {secondary.name}"
     found = secondary.trouble.removesuffix(".") or rate
-    return _item(
-        "second_source",
-        "Second source of altitude",
-        rate_hz >= SECONDARY_HZ,
-        found,
-        f"{SECONDARY_HZ:g} per second or more",
-        "Check that it tracks the vehicle and streams, or fly without it.",
-    )
+    return _item("second_source", rate_hz >= SECONDARY_HZ, found, f"{SECONDARY_HZ:g} per second or more")
 
 
 def evaluate_uid(radio: AutopilotLink, pinned: Identity) -> CheckItem:
     """Compare the hardware id with the pinned one."""
     uid = radio.seen.uid
-    return _item(
-        "hardware_id",
-        "Hardware id",
-        uid == pinned.uid,
-        uid or "not reported",
-        f"{pinned.uid}, as registered",
-        "Check which vehicle it is, then try again. If it no longer reports one, connect it again and release it.",
-    )
+    return _item("hardware_id", uid == pinned.uid, uid or "not reported", f"{pinned.uid}, as registered")
 
 
 def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radius_m: float) -> CheckItem:
@@ -108,14 +91,7 @@ def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radiu
         away_m = max(abs(watched.positions[-1].north_m), abs(watched.positions[-1].east_m))
         passed = away_m + radius_m <= plan_radius_m
         found = f"{away_m:.1f} m, plus the {radius_m:g} m that it may move from its start"
-    return _item(
-        "home",
-        "Distance from HOME",
-        passed,
-        found,
-        f"{plan_radius_m:g} m or less in total: beyond it the flight plan lands it",
-        "Move it closer to the place where it was switched on, or reduce its “Maximum distance from the start”.",
-    )
+    return _item("home", passed, found, f"{plan_radius_m:g} m or less in total: beyond it the flight plan lands it")
 
 
 def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
@@ -123,12 +99,10 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
     needed_s = record_s + LAND_COMMAND_S
     return _item(
         "flight time",
-        "Flight time",
         needed_s <= plan_time_s,
         f"{needed_s:g} s for the record and the command to land",
         f"{plan_time_s:g} s or less: after it the flight plan lands it",
-        "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
-        f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
+        needed_s=needed_s,
     )
 
 
@@ -138,13 +112,11 @@ def evaluate_set_points(set_points: SetPoints) -> CheckItem:
     pushed_m_s2 = max(map(abs, set_points.accelerations_m_s2), default=0.0)
     return _item(
         "altitudes",
-        "Altitudes",
         highest_m <= HIGHEST_SET_POINT_M and lowest_m > 0.5 * first_m and pushed_m_s2 <= LARGEST_PUSH_M_S2,
         f"set points from {lowest_m:g} to {highest_m:g} m"
         + (f", pushed by {pushed_m_s2:g} m/s²" if pushed_m_s2 else ""),
         f"above {0.5 * first_m:g} m, half of the first, and at most {HIGHEST_SET_POINT_M:g} m: the flight is "
         f"aborted at {ALTITUDE_LIMIT_M:g} m" + (f"; at most {LARGEST_PUSH_M_S2:g} m/s²" if pushed_m_s2 else ""),
-        "Choose a lower height, or smaller steps.",
     )
 
 
@@ -156,12 +128,11 @@ def evaluate_hover(hover_throttle: float | None, limits: HoverLimits | None) -> 
     return (
         _item(
             "hover_throttle",
-            "Hover throttle",
             limits.low <= hover_throttle <= limits.high,
             f"{hover_throttle:.2f} in the last flight",
             limits.words,
-            f"Set {limits.parameter} to {min(hover_throttle, limits.most):.2f}. If the vehicle or its load was "
-            "changed since that flight, disconnect it and connect it again instead.",
+            parameter=limits.parameter,
+            most=min(hover_throttle, limits.most),
         ),
     )
 
@@ -177,9 +148,11 @@ def require(items: Sequence[CheckItem]) -> None:
         raise VehicleError(f"The vehicle is not ready to fly. {found}.", hint=hints or "Correct this, then try again.")
 
 
-def _item(name: str, title: str, passed: bool, found: str, needed: str, hint: str) -> CheckItem:
-    """The result of a check; `hint` says what to do if it failed."""
-    return CheckItem(name=name, title=title, passed=passed, found=found, needed=needed, hint="" if passed else hint)
+def _item(name: str, passed: bool, found: str, needed: str, hint: str = "", **values: str | float) -> CheckItem:
+    """The result of a check; if it failed, with what to do: the `hint`, or else that of this check with the values."""
+    text = _TEXTS[name]
+    advice = "" if passed else hint or text["hint"].format(**values)
+    return CheckItem(name=name, title=text["title"], passed=passed, found=found, needed=needed, hint=advice)
 
 
 def _heartbeat(radio: AutopilotLink) -> CheckItem:
@@ -187,34 +160,20 @@ def _heartbeat(radio: AutopilotLink) -> CheckItem:
     version = f" {radio.seen.version}" if radio.seen.version else ""
     make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
     found = f"{title}{version}, system {radio.target.system}, {age_s:.1f} s ago" if make else "another autopilot"
-    return _item(
-        "heartbeat",
-        "Heartbeat",
-        make and age_s < radio.silence_s,
-        found,
-        f"{title}, within {radio.silence_s:g} s",
-        "Check that it is on and in range.",
-    )
+    return _item("heartbeat", make and age_s < radio.silence_s, found, f"{title}, within {radio.silence_s:g} s")
 
 
 def _single_vehicle(radio: AutopilotLink) -> CheckItem:
     reason = radio.link.duplicate_reason
     found = reason.removesuffix(".") or f"one vehicle uses system id {radio.target.system}"
-    return _item("alone", "System id", not reason, found, "one vehicle per system id on this link", ONE_VEHICLE)
+    return _item("alone", not reason, found, "one vehicle per system id on this link", ONE_VEHICLE)
 
 
 def _stopping(radio: AutopilotLink) -> CheckItem:
     ways = [f"the setting {name}" for name in radio.target.stop_settings]
     ways += ["the command to disarm"] if radio.target.stops_by_command else []
     found = " and ".join(ways) or "the vehicle did not confirm any command that stops its motors"
-    return _item(
-        "motors_off",
-        "Motors off",
-        bool(ways),
-        found,
-        "a confirmed way to stop its motors",
-        "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
-    )
+    return _item("motors_off", bool(ways), found, "a confirmed way to stop its motors")
 
 
 def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
@@ -231,7 +190,7 @@ def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
     if ready is None:
         return ()
     found = "passed" if ready else f"not passed; {_reasons(radio)}"
-    return (_item("own_checks", "Arming checks of the autopilot", ready, found, "passed", _checks_hint(radio)),)
+    return (_item("own_checks", ready, found, "passed", _checks_hint(radio)),)
 
 
 def _reasons(radio: AutopilotLink) -> str:
@@ -264,28 +223,24 @@ def _motion(watched: GroundObservation, reception: tuple[float, float]) -> tuple
     return (
         _item(
             "position",
-            "Position",
             rate_hz >= POSITIONS_HZ and lost_share <= LOST_SHARE,
             f"{rate_hz:.1f} per second, {100.0 * lost_share:.0f} % lost",
             f"{POSITIONS_HZ:g} per second or more, {100.0 * LOST_SHARE:.0f} % lost or less",
-            hint
-            or "Configure its telemetry for tuning (docs/real-flight.md), or improve a weak link and wait for 10 s.",
+            hint,
         ),
         _item(
             "clock",
-            "Vehicle clock",
             passed_s > 0.0,
             waiting or f"{passed_s:.2f} s passed in {watched.seconds:.2f} s",
             "an advancing clock",
-            hint or "Restart the vehicle.",
+            hint,
         ),
         _item(
             "still",
-            "Standing still",
             bool(positions) and moved_m <= STANDS_WITHIN_M,
             waiting or f"its altitude changed by {moved_m:.2f} m",
             f"{STANDS_WITHIN_M:g} m or less",
-            hint or "Put it on firm ground and let its position settle.",
+            hint,
         ),
     )
 
@@ -294,11 +249,9 @@ def _battery(battery_v: float | None, min_battery_v: float) -> CheckItem:
     found = "no voltage reported" if battery_v is None else f"{battery_v:.1f} V"
     return _item(
         "battery",
-        "Battery",
         battery_v is not None and battery_v >= min_battery_v,
         found,
         f"{min_battery_v:g} V or more",
-        "Insert a charged battery, or correct the limit.",
     )
 
 
@@ -312,12 +265,9 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
         found = f"not set by the flight plan (mode {mode}, block {radio.block or 'not reported'})"
     return _item(
         "ground_reference",
-        "Ground reference",
         is_set and watched.is_at_reference,
         found,
         f"set by the flight plan, within {STANDS_WITHIN_M:g} m of where it stands",
-        "Leave it on the ground where it starts, in its automatic mode, until it has a position, then check again: its "
-        "flight plan sets the reference, which takes 10 s.",
     )
 
 
@@ -330,7 +280,14 @@ def evaluate_requirement(radio: AutopilotLink, requirement: Requirement) -> Chec
     hint = f"{_correction(requirement, parameter, value)} in the autopilot; Gainline does not change it."
     passed = requirement.may_lack if value is None else requirement.is_met(value)
     found = "not reported" if value is None else f"{value:g}{off}"
-    return _item(f"failsafe {requirement.parameter}", f"{kind} {parameter}", passed, found, requirement.what, hint)
+    return CheckItem(
+        name=f"failsafe {requirement.parameter}",
+        title=f"{kind} {parameter}",
+        passed=passed,
+        found=found,
+        needed=requirement.what,
+        hint="" if passed else hint,
+    )
 
 
 def _correction(requirement: Requirement, parameter: str, value: float | None) -> str:

@@ -1,8 +1,10 @@
 """Parameters of ArduCopter's vertical loop, with the firmware's names."""
 
+import csv
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -62,37 +64,10 @@ DEFAULTS: Final[Mapping[str, float]] = MappingProxyType(Parameters().named)
 UNSUPPORTED: Final = ("PSC_VELZ_PDMX", "PSC_ACCZ_PDMX", "PSC_ACCZ_SMAX", "PSC_ACCZ_NTF", "PSC_ACCZ_NEF")
 """Limits and notch filters of the controllers that the replica lacks: they must be 0, as they are by default."""
 
-NEWER_NAMES: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
-    {
-        "PSC_D_POS_P": ("PSC_POSZ_P", 1.0),
-        "PSC_D_VEL_P": ("PSC_VELZ_P", 1.0),
-        "PSC_D_VEL_I": ("PSC_VELZ_I", 1.0),
-        "PSC_D_VEL_D": ("PSC_VELZ_D", 1.0),
-        "PSC_D_VEL_FF": ("PSC_VELZ_FF", 1.0),
-        "PSC_D_VEL_IMAX": ("PSC_VELZ_IMAX", 100.0),
-        "PSC_D_VEL_FLTE": ("PSC_VELZ_FLTE", 1.0),
-        "PSC_D_VEL_FLTD": ("PSC_VELZ_FLTD", 1.0),
-        "PSC_D_VEL_PDMX": ("PSC_VELZ_PDMX", 1.0),
-        "PSC_D_ACC_P": ("PSC_ACCZ_P", 10.0),
-        "PSC_D_ACC_I": ("PSC_ACCZ_I", 10.0),
-        "PSC_D_ACC_D": ("PSC_ACCZ_D", 10.0),
-        "PSC_D_ACC_FF": ("PSC_ACCZ_FF", 10.0),
-        "PSC_D_ACC_D_FF": ("PSC_ACCZ_D_FF", 10.0),
-        "PSC_D_ACC_IMAX": ("PSC_ACCZ_IMAX", 1000.0),
-        "PSC_D_ACC_FLTT": ("PSC_ACCZ_FLTT", 1.0),
-        "PSC_D_ACC_FLTE": ("PSC_ACCZ_FLTE", 1.0),
-        "PSC_D_ACC_FLTD": ("PSC_ACCZ_FLTD", 1.0),
-        "PSC_D_ACC_PDMX": ("PSC_ACCZ_PDMX", 1.0),
-        "PSC_D_ACC_SMAX": ("PSC_ACCZ_SMAX", 1.0),
-        "PSC_D_ACC_NTF": ("PSC_ACCZ_NTF", 1.0),
-        "PSC_D_ACC_NEF": ("PSC_ACCZ_NEF", 1.0),
-        "PSC_D_JERK": ("PSC_JERK_Z", 1.0),
-        "PSC_JERK_D": ("PSC_JERK_Z", 1.0),
-        "WP_SPD_UP": ("WPNAV_SPEED_UP", 100.0),
-        "WP_SPD_DN": ("WPNAV_SPEED_DN", 100.0),
-        "WP_ACC_Z": ("WPNAV_ACCEL_Z", 100.0),
-    }
-)
+with (Path(__file__).parent / "newer_names.csv").open(encoding="ascii", newline="") as _rows:
+    NEWER_NAMES: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
+        {row["newer"]: (row["older"], float(row["factor"])) for row in csv.DictReader(_rows)}
+    )
 """Names since release 4.7, each with the name until 4.6 and the factor from the new value to the old: gains for an
 acceleration in m/s² instead of cm/s², throttle as a share instead of per mille, m instead of cm
 (<https://ardupilot.org/copter/docs/common-param-name-changes.html>)."""
