@@ -102,7 +102,7 @@ def compare_logs(log_id: int, settings: Settings, *, before: int | None) -> None
         found = comparisons.compare(session, log_id, before)
     out, columns = console(), ("", f"log {found.before.id}", f"log {found.log.id}")
     out.print(shown(f"{found.log.file_name} compared with {found.before.file_name}: {found.verdict or 'same gains'}."))
-    for sentence in (found.sentence, *found.notes):
+    for sentence in filter(None, (found.sentence, *found.notes)):
         out.print(shown(sentence))
     out.print(table(columns, measured_texts(found), title="Measured"))
     if changed := changed_texts(found):

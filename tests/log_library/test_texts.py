@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.log_library.library_schemas import LogComparison
-from app.log_library.parameter_changes import ParameterChange
+from app.log_library.parameter_changes import ParameterChange, ParameterGroup
 from app.log_library.texts import changed_texts
 
 
@@ -22,5 +22,5 @@ from app.log_library.texts import changed_texts
 )
 def test_a_parameter_has_the_digits_that_tell_it_from_others(value: float | None, text: str) -> None:
     """Seen: two pressures that differ looked the same in seven digits."""
-    change = ParameterChange(name="A", group="other", before=value, after=1.5)
+    change = ParameterChange(name="A", group=ParameterGroup.OTHER, before=value, after=1.5)
     assert changed_texts(LogComparison.model_construct(parameters=[change])) == [("A", text, "1.5", "other")]
