@@ -1,13 +1,19 @@
 """Comparison of two logs of one vehicle: which parameters differ, and what the change of the gains does."""
 
+from collections.abc import Sequence
+
 from sqlalchemy.orm import Session
 
 from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import InputError, Problem
+from app.core.statistics.gain_change import FlownLog, GainChange, compare_logs, compare_takeoffs
+from app.db.models import AnalysedLogRow
 from app.log_library import repository, stored_answers
-from app.log_library.library_schemas import LogComparison
+from app.log_library.flights import unpack_flight
+from app.log_library.library_schemas import ErrorChange, LogComparison, StoredAnswer
 from app.log_library.parameter_changes import parameter_changes
 from app.log_library.stored_logs import log_view
+from app.log_library.texts import notes_of, sentence_of
 
 
 def compare(session: Session, log_id: int, before_id: int | None) -> LogComparison:
@@ -31,14 +37,30 @@ def compare(session: Session, log_id: int, before_id: int | None) -> LogComparis
             problems=(Problem("before", f"was flown under {before.autopilot}"),),
         )
     autopilot = next(each for each in AUTOPILOTS.values() if each.title == log.autopilot)
-    held = [stored_answers.unpack(each.answer).parameters for each in (before, log)]
+    stored = [stored_answers.unpack(each.answer) for each in (before, log)]
+    found = _gain_change((before, log), stored)
     return LogComparison(
         log=log_view(log),
         before=log_view(before),
-        verdict="not known yet",
-        confidence=None,
-        effect=None,
-        sentence="",
-        notes=[],
-        parameters=parameter_changes(autopilot, *held),
+        verdict=found.verdict,
+        confidence=found.comparison and found.comparison.confidence,
+        basis=found.basis,
+        change=ErrorChange.view_of(found, standard_error_m=found.comparison and found.comparison.standard_error),
+        is_contradicted=found.is_contradicted,
+        sentence=sentence_of(found),
+        notes=notes_of(found),
+        parameters=parameter_changes(autopilot, *(each.parameters for each in stored)),
     )
+
+
+def _gain_change(rows: Sequence[AnalysedLogRow], stored: Sequence[StoredAnswer]) -> GainChange:
+    takeoffs = [each.takeoffs for each in stored]
+    return compare_takeoffs(*takeoffs) if all(takeoffs) else compare_logs(*(_flown(each) for each in rows))
+
+
+def _flown(row: AnalysedLogRow) -> FlownLog:
+    error_m = log_view(row).numbers.deviation_m
+    if row.flight is None:
+        return FlownLog(error_m=error_m)
+    unpacked = unpack_flight(row.flight)
+    return FlownLog(error_m=error_m, flight=unpacked.flight, copters=unpacked.copters)

@@ -25,7 +25,8 @@ from app.core.analysis.shapes import find_shapes
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.formatting import capitalised
 from app.core.reasons import UNNAMED_FRAME, ReasonCode
-from app.core.tuning.logged_takeoffs import analyze_takeoffs
+from app.core.statistics.gain_change import ScoredTakeoff
+from app.core.tuning.logged_takeoffs import analyze_takeoffs, score_takeoffs
 from app.figures.panels import Plot
 from app.log_library import descriptions, manoeuvres, replicas, shapes, takeoffs
 from app.log_library.flights import pack_flight
@@ -93,6 +94,7 @@ class AnalysedContent:
     parameters: Mapping[str, float] = field(default_factory=dict)
     fit: LogFit | None = None
     flight: bytes | None = None
+    takeoffs: Sequence[ScoredTakeoff] = ()
     definition: Definition | None = None
 
 
@@ -142,6 +144,7 @@ def analyze_content(
         numbers=tuning.numbers,
         fit=tuning.fit,
         flight=tuning.flight,
+        takeoffs=tuning.takeoffs,
         definition=tuning.definition,
     )
     if recording is None:
@@ -165,6 +168,7 @@ class _Answered(Generic[_Answer]):
     numbers: LogNumbers = field(default_factory=LogNumbers)
     fit: LogFit | None = None
     flight: bytes | None = None
+    takeoffs: Sequence[ScoredTakeoff] = ()
     definition: Definition | None = None
 
 
@@ -206,9 +210,16 @@ def _analyzed(flown: LoggedFlight | Sequence[Takeoff], name: str) -> _Answered[T
             flight=pack_flight(flown, flight.estimate.draws),
             definition=manoeuvres.start_of(flight, name) if answer.starts_campaign else None,
         )
-    takeoff = analyze_takeoffs(takeoffs.logged_takeoffs(flown, name=name))
+    logged = takeoffs.logged_takeoffs(flown, name=name)
+    takeoff = analyze_takeoffs(logged)
     answer, texts = takeoffs.answer_of(takeoff, name)
-    return _Answered(answer, texts, [takeoffs.plot_of(takeoff)], numbers=takeoffs.listed_numbers(takeoff))
+    return _Answered(
+        answer,
+        texts,
+        [takeoffs.plot_of(takeoff)],
+        numbers=takeoffs.listed_numbers(takeoff),
+        takeoffs=score_takeoffs(logged),
+    )
 
 
 def _margins(recording: Recording, description: Description | None) -> UsualMargins | None:

@@ -12,6 +12,7 @@ from app.core.analysis.analysis import Grade
 from app.core.analysis.description import Description
 from app.core.analysis.shapes import FailureShape
 from app.core.statistics.comparisons import Verdict
+from app.core.statistics.gain_change import Basis, ScoredTakeoff
 from app.figures.base import Card
 from app.figures.panels import Plot
 from app.figures.theme import ThemeName
@@ -88,6 +89,7 @@ class StoredAnswer(Schema):
     answer: LogAnswer
     plots: Mapping[Part, Sequence[Plot]]
     parameters: Mapping[str, float]
+    takeoffs: Sequence[ScoredTakeoff]
     definition: Definition | None
 
 
@@ -116,13 +118,15 @@ class LoggedVehicle(LoggedVehicleBrief):
     newest: AnalysedLog
 
 
-class GainEffect(Schema):
-    """What the change of the gains does to the error, in the manoeuvres and the weather of both logs: a factor with its
-    90 % interval, less than 1 if the later gains are better."""
+class ErrorChange(Schema):
+    """Differences of two logs' errors, later − earlier, m, and what of it the models of both flights attribute to what;
+    null for what is not known."""
 
-    factor: float
-    low: float
-    high: float
+    measured_m: float | None
+    by_gains_m: Annotated[float | None, Field(description="in the manoeuvres and the weather of both")]
+    by_manoeuvre_m: float | None
+    by_weather_m: float | None
+    standard_error_m: Annotated[float | None, Field(description="of two single flights")]
 
 
 class LogComparison(Schema):
@@ -132,7 +136,9 @@ class LogComparison(Schema):
     before: AnalysedLog
     verdict: Annotated[Verdict | None, Field(description="on the gains of the later log; null: they are the same")]
     confidence: float | None
-    effect: Annotated[GainEffect | None, Field(description="null: a log does not tell the vehicle, or the same gains")]
+    basis: Annotated[Basis, Field(description="what the comparison of the gains rests on")]
+    change: ErrorChange
+    is_contradicted: Annotated[bool, Field(description="whether the flights went the other way than the verdict says")]
     sentence: str
     notes: Sequence[str]
     parameters: Annotated[list[ParameterChange], Field(description="all that differ, gains first")]

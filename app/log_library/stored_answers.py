@@ -22,9 +22,7 @@ _LEVEL: Final = 12
 
 def pack(found: AnalysedContent) -> bytes:
     """An answer with its figures, of which every other point is left out until it is at most `LARGEST_BYTES`."""
-    stored = StoredAnswer(
-        answer=found.answer, plots=found.plots, parameters=found.parameters, definition=found.definition
-    )
+    stored = StoredAnswer.view_of(found)
     compressor = zstandard.ZstdCompressor(level=_LEVEL)
     while len(packed := compressor.compress(stored.model_dump_json().encode())) > LARGEST_BYTES:
         points = max(len(line.x) for plots in stored.plots.values() for each in plots for line in _lines(each))

@@ -1,11 +1,14 @@
 """What documents and the command line write alike about logs: an answer part by part, its numbers, and parameters."""
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from app.core.analysis.analysis import Grade
-from app.core.formatting import NOTHING, number
+from app.core.formatting import NOTHING, count, number
+from app.core.statistics.comparisons import Verdict
+from app.core.statistics.gain_change import Basis, GainChange
 from app.log_library.library_schemas import LogComparison, LogNumbers
 from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal
 from app.log_library.trends import QUANTITIES
@@ -42,6 +45,41 @@ def measured_texts(found: LogComparison) -> list[tuple[str, str, str]]:
 def changed_texts(found: LogComparison) -> list[tuple[str, str, str, str]]:
     """Name, both values and group of each parameter that is not the same in two logs."""
     return [(each.name, _value(each.before), _value(each.after), each.group) for each in found.parameters]
+
+
+_SENTENCES: Final[Mapping[tuple[Basis, Verdict | None], str]] = {
+    (basis, verdict): sentence
+    for basis in (Basis.MODELS, Basis.TAKEOFFS)
+    for verdict, sentence in (
+        ("better", "The later gains are better."),
+        ("worse", "The later gains are worse."),
+        ("unresolved", "The gains differ by less than two flights with the same gains do."),
+    )
+} | {
+    (Basis.SAME_GAINS, None): "Both logs have the same gains.",
+    (Basis.NOT_COMPARABLE, "not known yet"): "The gains are not compared: a log does not have what its model needs.",
+}
+_CONTRADICTED: Final = (
+    "The flights went the other way. The weather has changed much, or something happened that the model does not know: "
+    "vibration, a loose propeller, another load."
+)
+
+
+def sentence_of(change: GainChange) -> str:
+    """Which gains are better."""
+    return _SENTENCES[change.basis, change.verdict]
+
+
+def notes_of(change: GainChange) -> list[str]:
+    """What the measured difference comes from, and what the verdict leaves open."""
+    gains_m, manoeuvre_m, weather_m = change.by_gains_m, change.by_manoeuvre_m, change.by_weather_m
+    causes = (("the gains", gains_m), ("the manoeuvre", manoeuvre_m), ("the weather", weather_m))
+    known = ", ".join(f"{1e3 * metres:+.1f} mm to {what}" for what, metres in causes if metres is not None)
+    attributed = f"; the models attribute {known}" if known else ""
+    further = change.comparison and change.comparison.further
+    notes = [] if change.measured_m is None else [f"Measured: {1e3 * change.measured_m:+.1f} mm{attributed}."]
+    notes += [f"{count(further.total, 'further flight')} would decide, if the difference stays."] if further else []
+    return [*notes, _CONTRADICTED] if change.is_contradicted else notes
 
 
 def _value(parameter: float | None) -> str:
