@@ -39,13 +39,14 @@ def compare(session: Session, log_id: int, before_id: int | None) -> LogComparis
     autopilot = next(each for each in AUTOPILOTS.values() if each.title == log.autopilot)
     stored = [stored_answers.unpack(each.answer) for each in (before, log)]
     found = _gain_change((before, log), stored)
+    gains = found.comparison
     return LogComparison(
         log=log_view(log),
         before=log_view(before),
         verdict=found.verdict,
-        confidence=found.comparison and found.comparison.confidence,
+        confidence=None if gains is None else gains.confidence,
         basis=found.basis,
-        change=ErrorChange.view_of(found, standard_error_m=found.comparison and found.comparison.standard_error),
+        change=ErrorChange.view_of(found, standard_error_m=None if gains is None else gains.standard_error),
         is_contradicted=found.is_contradicted,
         sentence=sentence_of(found),
         notes=notes_of(found),

@@ -11,11 +11,11 @@ from app.core.analysis import shapes
 from app.core.analysis.description import LEAST_PERIODS
 from app.core.analysis.shapes import FailureShape, FoundShape
 from app.core.formatting import percent
-from app.figures.base import card_of
+from app.figures.base import Card, card_of
 from app.figures.panels import Line, Panel, PanelsFigure, Plot, Style
 from app.figures.theme import ThemeName
 from app.log_library.library_schemas import AtlasShape
-from app.log_library.schemas import ShapeTexts
+from app.log_library.schemas import FoundShapeField, ShapeTexts
 
 ATLAS: Final = Path(__file__).with_name("failure_shapes.json")
 """A simulated flight with each shape, which `python -m bench.failure_shapes --atlas` writes."""
@@ -108,50 +108,47 @@ _PANELS: Final[Mapping[str, Mapping[str, tuple[str, Style]]]] = {
 """Panels of a figure, each with its lines by the name of the column; those without a column are not drawn."""
 
 
+def fields_of(found: Sequence[FoundShape]) -> list[FoundShapeField]:
+    """Shapes found in a log, in numbers."""
+    return [FoundShapeField.view_of(each, code=each.shape) for each in found]
+
+
 def texts_of(found: Sequence[FoundShape]) -> list[ShapeTexts]:
-    """Shapes found in a log, for a person."""
-    return [
-        ShapeTexts.view_of(WORDS[each.shape], found=_sentence(each.shape, each.numbers, each.since_s)) for each in found
-    ]
+    """The same for a person."""
+    sentences = {each.shape: _sentence(each.shape, each.numbers, each.since_s) for each in found}
+    return [ShapeTexts.view_of(WORDS[shape], found=sentence) for shape, sentence in sentences.items()]
 
 
 @cache
 def atlas() -> tuple[AtlasShape, ...]:
     """All shapes, each with its figure."""
+    traces = json.loads(ATLAS.read_text())
     return tuple(
-        AtlasShape.view_of(
-            WORDS[shape],
-            code=shape,
-            figures={theme: card_of(PanelsFigure(drawn, theme_name=theme)) for theme in get_args(ThemeName)},
-        )
-        for shape, drawn in ((each, plot_of(each, trace)) for each, trace in _traces().items())
+        AtlasShape.view_of(WORDS[each], code=each, figures=_cards(plot_of(each, traces[each]))) for each in FailureShape
     )
 
 
 def plot_of(shape: FailureShape, trace: Mapping[str, Any]) -> Plot:
     """The figure of a simulated flight with a shape."""
-    panels = []
-    for y_title, lines in _PANELS.items():
-        drawn = tuple(
-            Line(name=name, style=style, x=_times_s(trace, column), y=tuple(trace[column]))
+    x = tuple(round(trace["step_s"] * row, 2) for row in range(len(trace["altitude_m"])))
+    panels = {
+        y_title: tuple(
+            Line(name=name, style=style, x=x, y=tuple(trace[column]))
             for column, (name, style) in lines.items()
             if column in trace
         )
-        panels += [Panel(y_title=y_title, lines=drawn)] if drawn else []
+        for y_title, lines in _PANELS.items()
+    }
     return Plot(
         title=WORDS[shape].title,
         summary=_sentence(shape, trace["numbers"], trace["since_s"]),
         x_title="Time (s)",
-        panels=tuple(panels),
+        panels=tuple(Panel(y_title=y_title, lines=lines) for y_title, lines in panels.items() if lines),
     )
 
 
-def _traces() -> dict[FailureShape, dict[str, Any]]:
-    return {FailureShape(name): trace for name, trace in json.loads(ATLAS.read_text()).items()}
-
-
-def _times_s(trace: Mapping[str, Any], column: str) -> tuple[float, ...]:
-    return tuple(round(trace["step_s"] * row, 2) for row in range(len(trace[column])))
+def _cards(plot: Plot) -> dict[ThemeName, Card]:
+    return {theme: card_of(PanelsFigure(plot, theme_name=theme)) for theme in get_args(ThemeName)}
 
 
 def _sentence(shape: FailureShape, numbers: Mapping[str, float], since_s: float) -> str:

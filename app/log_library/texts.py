@@ -8,7 +8,7 @@ import numpy as np
 from app.core.analysis.analysis import Grade
 from app.core.formatting import NOTHING, count, number
 from app.core.statistics.comparisons import Verdict
-from app.core.statistics.gain_change import Basis, GainChange
+from app.core.statistics.gain_change import GainChange
 from app.log_library.library_schemas import LogComparison, LogNumbers
 from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal
 from app.log_library.trends import QUANTITIES
@@ -47,17 +47,12 @@ def changed_texts(found: LogComparison) -> list[tuple[str, str, str, str]]:
     return [(each.name, _value(each.before), _value(each.after), each.group) for each in found.parameters]
 
 
-_SENTENCES: Final[Mapping[tuple[Basis, Verdict | None], str]] = {
-    (basis, verdict): sentence
-    for basis in (Basis.MODELS, Basis.TAKEOFFS)
-    for verdict, sentence in (
-        ("better", "The later gains are better."),
-        ("worse", "The later gains are worse."),
-        ("unresolved", "The gains differ by less than two flights with the same gains do."),
-    )
-} | {
-    (Basis.SAME_GAINS, None): "Both logs have the same gains.",
-    (Basis.NOT_COMPARABLE, "not known yet"): "The gains are not compared: a log does not have what its model needs.",
+_SENTENCES: Final[Mapping[Verdict | None, str]] = {
+    "better": "The later gains are better.",
+    "worse": "The later gains are worse.",
+    "unresolved": "The gains differ by less than two flights with the same gains do.",
+    "not known yet": "The gains are not compared: a log does not have what its model needs.",
+    None: "Both logs have the same gains.",
 }
 _CONTRADICTED: Final = (
     "The flights went the other way. The weather has changed much, or something happened that the model does not know: "
@@ -67,7 +62,7 @@ _CONTRADICTED: Final = (
 
 def sentence_of(change: GainChange) -> str:
     """Which gains are better."""
-    return _SENTENCES[change.basis, change.verdict]
+    return _SENTENCES[change.verdict]
 
 
 def notes_of(change: GainChange) -> list[str]:

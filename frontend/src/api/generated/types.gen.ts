@@ -267,6 +267,14 @@ export type AutopilotInfo = {
 };
 
 /**
+ * Basis
+ *
+ * What a comparison of two logs rests on: both flights' models; repeated takeoffs; or nothing but the measured
+ * errors, because the gains are the same, or one of the logs does not have what a comparison needs.
+ */
+export type Basis = 'models' | 'takeoffs' | 'same gains' | 'not comparable';
+
+/**
  * Behaviour
  *
  * The flight itself: analysed time, s; mean and largest distance between reference and altitude, m; range of the
@@ -1295,6 +1303,39 @@ export type Drift = {
 };
 
 /**
+ * ErrorChange
+ *
+ * Differences of two logs' errors, later − earlier, m, and what of it the models of both flights attribute to what;
+ * null for what is not known.
+ */
+export type ErrorChange = {
+    /**
+     * Measured M
+     */
+    measured_m: number | null;
+    /**
+     * By Gains M
+     *
+     * in the manoeuvres and the weather of both
+     */
+    by_gains_m: number | null;
+    /**
+     * By Manoeuvre M
+     */
+    by_manoeuvre_m: number | null;
+    /**
+     * By Weather M
+     */
+    by_weather_m: number | null;
+    /**
+     * Standard Error M
+     *
+     * of two single flights
+     */
+    standard_error_m: number | null;
+};
+
+/**
  * Estimate
  *
  * One calibration. `flight` counts the vehicle's flights over all its campaigns.
@@ -1997,27 +2038,6 @@ export type GainChange = {
 };
 
 /**
- * GainEffect
- *
- * What the change of the gains does to the error, in the manoeuvres and the weather of both logs: a factor with its
- * 90 % interval, less than 1 if the later gains are better.
- */
-export type GainEffect = {
-    /**
-     * Factor
-     */
-    factor: number;
-    /**
-     * Low
-     */
-    low: number;
-    /**
-     * High
-     */
-    high: number;
-};
-
-/**
  * GainsInManoeuvre
  *
  * A gain set in the same manoeuvre and weather.
@@ -2639,9 +2659,16 @@ export type LogComparison = {
      */
     confidence: number | null;
     /**
-     * null: a log does not tell the vehicle, or the same gains
+     * what the comparison of the gains rests on
      */
-    effect: GainEffect | null;
+    basis: Basis;
+    change: ErrorChange;
+    /**
+     * Is Contradicted
+     *
+     * whether the flights went the other way than the verdict says
+     */
+    is_contradicted: boolean;
     /**
      * Sentence
      */
