@@ -22,6 +22,7 @@ _REFERENCES: Final = ("desired_altitude_m", "reference_m", "target_altitude_m", 
 _THROTTLES: Final = ("thrust_target", "thrust", "demanded_throttle", "throttle")
 """The first is the vertical part."""
 _LARGEST: Final = 1e6
+_HOVER_PARAMETERS: Final = ("MOT_THST_HOVER", "MPC_THR_HOVER")
 
 
 def signals_of(recording: Recording) -> FlightSignals | None:
@@ -51,6 +52,8 @@ def signals_of(recording: Recording) -> FlightSignals | None:
         throttle=throttle,
         flown=flown,
         held=flown & holds & np.isfinite(reference_m) & ~find_landings(time_s, altitude_m, climb_rate_m_s, downs_s),
+        sensed_m_s2=_known(recording, ("acceleration_m_s2",), time_s),
+        assumed_hover=next((each.value for each in recording.settings if each.name in _HOVER_PARAMETERS), None),
     )
 
 

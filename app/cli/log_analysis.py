@@ -46,6 +46,8 @@ def _print_part(out: Console, title: str, texts: PartTexts) -> None:
         out.print(escape(f"  {reason}"))
     for facts in texts.facts:
         out.print(escape(f"{facts.title}: {', '.join(facts.values)}."))
+    for shape in texts.shapes:
+        out.print(escape(f"{shape.title}: {shape.found}\n  {shape.advice}"))
     if texts.table is not None:
         out.print(table(texts.table.columns, texts.table.rows, title=texts.table.title))
     for note in texts.notes:

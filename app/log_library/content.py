@@ -21,12 +21,13 @@ from app.core.analysis.combined_fit import LogFit, log_fit
 from app.core.analysis.description import Description, describe
 from app.core.analysis.hand_rules import UsualMargins, usual_margins
 from app.core.analysis.loop import LoggedFlight
+from app.core.analysis.shapes import find_shapes
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.formatting import capitalised
 from app.core.reasons import UNNAMED_FRAME, ReasonCode
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.figures.panels import Plot
-from app.log_library import descriptions, manoeuvres, replicas, takeoffs
+from app.log_library import descriptions, manoeuvres, replicas, shapes, takeoffs
 from app.log_library.flights import pack_flight
 from app.log_library.library_schemas import LogNumbers
 from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
@@ -170,14 +171,15 @@ def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[Tuning
         described = None if _OTHER_KIND in codes else description
         margins = None if codes & _DOUBTFUL else _margins(recording, described)
         found = _Answered(*descriptions.answer_of(error, described, margins))
-    if description is None or found.answer.grade is Grade.REFUSED:
+    if signals is None or description is None or found.answer.grade is Grade.REFUSED:
         return found
     facts = [*found.texts.facts, descriptions.flight_facts(description)]
+    seen = find_shapes(signals, description)
     return replace(
         found,
         numbers=found.numbers.completed_by(description),
-        answer=found.answer.model_copy(update={"description": description}),
-        texts=found.texts.model_copy(update={"facts": facts}),
+        answer=found.answer.model_copy(update={"description": description, "shapes": shapes.fields_of(seen)}),
+        texts=found.texts.model_copy(update={"facts": facts, "shapes": shapes.texts_of(seen)}),
     )
 
 

@@ -10,12 +10,13 @@ from app.campaigns.schemas import Definition
 from app.common.schemas import Gains, Name, Request, Schema
 from app.core.analysis.analysis import Grade
 from app.core.analysis.description import Description
+from app.core.analysis.shapes import FailureShape
 from app.core.statistics.comparisons import Verdict
 from app.figures.base import Card
 from app.figures.panels import Plot
 from app.figures.theme import ThemeName
 from app.log_library.parameter_changes import ParameterChange
-from app.log_library.schemas import EstimatedValue, LogAnswer, Part
+from app.log_library.schemas import EstimatedValue, LogAnswer, Part, ShapeWords
 
 
 class LogNumbers(Schema):
@@ -158,3 +159,10 @@ class LoggedVehicleDetails(LoggedVehicle):
     """A vehicle, and what its logs tell together."""
 
     combined: Annotated[CombinedVehicle | None, Field(description="null: fewer than two logs tell the vehicle")]
+
+
+class AtlasShape(ShapeWords):
+    """A shape of failure in the atlas."""
+
+    code: FailureShape
+    figures: Annotated[dict[ThemeName, Card], Field(description="of a simulated flight with it, by theme")]

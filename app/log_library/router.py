@@ -1,5 +1,6 @@
-"""Log analyses and the log library over HTTP."""
+"""Log analyses, the log library and the atlas of failure shapes over HTTP."""
 
+from collections.abc import Sequence
 from typing import Annotated
 from urllib.parse import quote
 
@@ -8,9 +9,10 @@ from fastapi import APIRouter, Query, Response, status
 from app.campaigns.schemas import Campaign
 from app.common.schemas import Page, uploaded_name
 from app.figures.base import Card
-from app.log_library import comparisons, service, stored_logs, trends
+from app.log_library import comparisons, service, shapes, stored_logs, trends
 from app.log_library.library_schemas import (
     AnalysedLog,
+    AtlasShape,
     LogAnalysis,
     LogComparison,
     LogExport,
@@ -40,6 +42,14 @@ SystemId = Annotated[int | None, Query(ge=0, le=255, description="system id, if 
 RegisteredVehicle = Annotated[int | None, Query(ge=1, le=2**63 - 1)]
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 vehicles = APIRouter(prefix="/api/logged-vehicles", tags=["log analyses"])
+failure_shapes = APIRouter(prefix="/api/failure-shapes", tags=["log analyses"])
+
+
+@failure_shapes.get("")
+def list_failure_shapes() -> Sequence[AtlasShape]:
+    """List the shapes of failure that a log is searched for: how each is recognised, what to do, and what it looks like
+    in a simulated flight."""
+    return shapes.atlas()
 
 
 @router.post("", openapi_extra=REQUEST_BODY)

@@ -10,6 +10,7 @@ from app.common.schemas import Gains, Schema
 from app.core.analysis.analysis import Behaviour, Grade
 from app.core.analysis.description import Description
 from app.core.analysis.hand_rules import UsualGains
+from app.core.analysis.shapes import FailureShape
 from app.core.models.copter import Copter
 
 Unit = Annotated[str, AfterValidator(lambda unit: unit.replace(" ", "_"))]
@@ -149,12 +150,27 @@ class Facts(Schema):
     values: Sequence[str]
 
 
+class ShapeWords(Schema):
+    """A shape of failure for a person."""
+
+    title: str
+    recognised: Annotated[str, Field(description="how the program recognises it")]
+    advice: Annotated[str, Field(description="what to do")]
+
+
+class ShapeTexts(ShapeWords):
+    """One that was found."""
+
+    found: Annotated[str, Field(description="with the numbers of this log")]
+
+
 class PartTexts(Schema):
     """A part of the answer for a person."""
 
     answer: str
     reasons: Annotated[Sequence[str], Field(description="the part's reasons as sentences")] = ()
     facts: Sequence[Facts] = ()
+    shapes: Annotated[Sequence[ShapeTexts], Field(description="the part's shapes of failure, in the same order")] = ()
     table: TextTable | None = None
     notes: Annotated[Sequence[str], Field(description="how to read the table, precautions, what to do")] = ()
     parameter_file: ParameterFile | None = None
@@ -167,6 +183,14 @@ class ReasonField(Schema):
     field: Annotated[str, Field(description="the message, column or parameter concerned; file: the whole log")]
     numbers: Annotated[dict[str, float], Field(description="by names that end in their unit")]
     named: Annotated[list[str], Field(description="what else the reason names: modes, parameters, a kind of vehicle")]
+
+
+class FoundShapeField(Schema):
+    """A shape of failure in the flight."""
+
+    code: FailureShape
+    numbers: Annotated[dict[str, float], Field(description="by names that end in their unit; 1: a share or a number")]
+    since_s: Annotated[float, Field(description="when it is seen first, s of the recording")]
 
 
 class TuningAnswer(Schema):
@@ -187,6 +211,7 @@ class TuningAnswer(Schema):
         Field(description="of this campaign, for a vehicle that flies it; null: the vehicle is flown elsewhere"),
     ] = None
     description: Annotated[Description | None, Field(description="the whole flight as it was flown")] = None
+    shapes: Annotated[Sequence[FoundShapeField], Field(description="shapes of failure in the whole flight")] = ()
     numbers: ManoeuvreNumbers | UsualNumbers | TakeoffNumbers | None = None
 
 

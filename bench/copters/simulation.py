@@ -182,12 +182,12 @@ def weather_of(
         (copter.wander_m_s, climb_rate_wander_s),
         (copter.wander_m, _ALTITUDE_WANDER_S),
     )
-    gust, climb_rate, altitude = (deviation * _coloured(random, steps, step_s / time_s) for deviation, time_s in slow)
+    gust, climb_rate, altitude = (deviation * coloured(random, steps, step_s / time_s) for deviation, time_s in slow)
     noise, _ = lfilter(*accelerometer_filter(FILTER_HZ, step_s), random.standard_normal(steps), zi=np.zeros(2))
     return np.column_stack([gust, copter.noise_m_s2 * noise / noise.std(), climb_rate, altitude])
 
 
-def _coloured(random: np.random.Generator, steps: int, step: float) -> Samples:
+def coloured(random: np.random.Generator, steps: int, step: float) -> Samples:
     """Noise of standard deviation 1, correlated over the time of which a step is the share `step`."""
     kept = float(np.exp(-step))
     drive = np.sqrt(1.0 - kept**2) * random.standard_normal(steps)

@@ -153,7 +153,9 @@ def test_a_log_that_lacks_something_tells_what_it_can_and_names_it(log: PoorLog,
     require_data(found)
     is_compared = "signals" in found["replica"]
     assert (code, "Traceback" in output) == (int(log.grade == "refused" and not is_compared), False)
-    assert log.said in " ".join(output.split())
+    printed = " ".join(output.split())
+    for said in (log.said, *(each["found"] for each in found["texts"]["tuning"]["shapes"])):
+        assert said in printed
     frames = {"plane.bin": "plane", "helicopter.bin": "helicopter", "plane.ulg": "plane", "plane.tlog": "plane"}
     assert found["frame"] == frames.get(log.name, "quadrotor" if log.name.endswith(".tlog") else None)
     tuning = found["tuning"]

@@ -96,6 +96,9 @@ def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -
     hover = found["numbers"]["hover"]
     assert (hover["parameter"], hover["present"], hover["is_outside"]) == ("MPC_THR_HOVER", pytest.approx(0.35), False)
     assert any("Set MPC_THR_HOVER to" in note for note in texts["notes"])
+    (shape,), (told,) = found["shapes"], texts["shapes"]
+    assert (shape["code"], shape["numbers"]["assumed_1"]) == ("hover_throttle", pytest.approx(0.35))
+    assert "the parameter is 0.350" in told["found"]
     assert texts["table"]["columns"][:5] == ["Gains", "Z_P", "Z_VEL_P_ACC", "Z_VEL_I_ACC", "Z_VEL_D_ACC"]
     assert [row[0] for row in texts["table"]["rows"]] == [
         "As flown",

@@ -74,6 +74,18 @@ def test_every_kind_of_log_tells_the_hover_throttle_and_the_deviation(kind: str)
     assert found.held_s > 12.0
 
 
+def test_logs_have_the_sensed_acceleration_and_the_parameter_for_hover_and_telemetry_the_parameter_alone() -> None:
+    recordings = (
+        copter(ardupilot_log(simulated_flight(QUIET))),
+        read_px4(io.BytesIO(px4_log(simulated_px4()))),
+        read_tlog(io.BytesIO(Telemetry().content)),
+    )
+    signals = [each for each in map(signals_of, recordings) if each is not None]
+    assert [each.assumed_hover for each in signals] == pytest.approx([0.35, 0.35, 0.35])
+    assert [bool(np.isfinite(each.sensed_m_s2).all()) for each in signals] == [True, True, False]
+    assert np.corrcoef(signals[1].sensed_m_s2, np.gradient(signals[1].climb_rate_m_s))[0, 1] > 0.5
+
+
 def test_manual_modes_and_the_ground_are_not_held_and_not_flown() -> None:
     log = ardupilot_log(
         simulated_flight(QUIET),

@@ -18,7 +18,7 @@ _OFF_GROUND_M: Final = 0.5
 _NEAR_LIMIT: Final = 1e-3
 _SHORTEST_S: Final = 8.0
 _SLOWEST_HZ: Final = 0.2
-_LEAST_PERIODS: Final = 5.0
+LEAST_PERIODS: Final = 5.0
 _SMOOTHED_PERIODS: Final = 3.0
 _STRONG: Final = 0.95
 """Quantile of the envelope: its largest values may be those of a takeoff or of the first step."""
@@ -33,7 +33,8 @@ it."""
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightSignals:
     """Signals of a whole recording, up, shape (n,) each, NaN where one is not known; `time_s` increases. The vehicle is
-    in the air in the rows `flown`, and follows an altitude by itself in those of them that are `held`."""
+    in the air in the rows `flown`, and follows an altitude by itself in those of them that are `held`. The acceleration
+    is as sensed, without gravity; `assumed_hover` is the parameter for the throttle in hover, None if not known."""
 
     time_s: Samples
     altitude_m: Samples
@@ -42,6 +43,8 @@ class FlightSignals:
     throttle: Samples
     flown: NDArray[np.bool_]
     held: NDArray[np.bool_]
+    sensed_m_s2: Samples
+    assumed_hover: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +149,7 @@ def find_oscillation(time_s: Samples, deviation_m: Samples, reference_m: Samples
     frequency_hz = np.fft.rfftfreq(len(time_s), step_s)
     spectra = [np.abs(np.fft.rfft(window * _detrended(time_s, each))) for each in (deviation_m, reference_m)]
     power = (frequency_hz * spectra[0]) ** 2
-    counted = frequency_hz >= max(_SLOWEST_HZ, _LEAST_PERIODS / (time_s[-1] - time_s[0]))
+    counted = frequency_hz >= max(_SLOWEST_HZ, LEAST_PERIODS / (time_s[-1] - time_s[0]))
     above = np.where(counted, power / np.maximum(median_filter(power, _BESIDE), np.finfo(float).tiny), 0.0)
     line = int(np.argmax(above[:-1]))
     if above[line] < _ABOVE_NOISE or spectra[1][line] >= _COMMANDED * spectra[0][line]:
@@ -156,7 +159,7 @@ def find_oscillation(time_s: Samples, deviation_m: Samples, reference_m: Samples
     turned = _detrended(time_s, deviation_m) * np.exp(-2j * np.pi * at_hz * time_s)
     envelope_m = 2.0 * np.abs(uniform_filter1d(turned, max(round(_SMOOTHED_PERIODS / at_hz / step_s), 1)))
     oscillates = np.flatnonzero(envelope_m > 0.5 * np.quantile(envelope_m, _STRONG))
-    if len(oscillates) * step_s * at_hz < _LEAST_PERIODS:
+    if len(oscillates) * step_s * at_hz < LEAST_PERIODS:
         return None
     amplitude_m = float(np.median(envelope_m[oscillates]))
     return Oscillation(frequency_hz=at_hz, amplitude_m=amplitude_m, since_s=float(time_s[oscillates[0]]))

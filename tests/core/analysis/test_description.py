@@ -32,6 +32,7 @@ def flight(*, rate_hz: float = 10.0, lasts_s: float = 60.0, seed: int = 1) -> Fl
         throttle=np.where(flown, 0.4 + 0.01 * noise + 0.1 * (time_s < 20.0), 0.0),
         flown=flown,
         held=time_s > 20.0,
+        sensed_m_s2=np.zeros_like(time_s),
     )
 
 

@@ -194,6 +194,39 @@ export type AnalysedLog = {
 };
 
 /**
+ * AtlasShape
+ *
+ * A shape of failure in the atlas.
+ */
+export type AtlasShape = {
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Recognised
+     *
+     * how the program recognises it
+     */
+    recognised: string;
+    /**
+     * Advice
+     *
+     * what to do
+     */
+    advice: string;
+    code: FailureShape;
+    /**
+     * Figures
+     *
+     * of a simulated flight with it, by theme
+     */
+    figures: {
+        [key: string]: Card;
+    };
+};
+
+/**
  * AutopilotInfo
  *
  * An autopilot over MAVLink.
@@ -1459,6 +1492,13 @@ export type Facts = {
 export type Failure = 'F1' | 'F2' | 'F3' | 'F4a' | 'F4b' | 'F5' | 'F6' | 'F7' | 'F8' | 'F9a' | 'F9b' | 'F9c' | 'F9d' | 'F9e' | 'F10a' | 'F10b' | 'F10c' | 'F11' | 'F12' | 'F13' | 'F14a' | 'F14b' | 'F14c';
 
 /**
+ * FailureShape
+ *
+ * A way in which an altitude, or what it is controlled with, goes wrong.
+ */
+export type FailureShape = 'ringing' | 'windup' | 'hover_throttle' | 'saturated_climb' | 'estimator_jump' | 'vibration' | 'wind';
+
+/**
  * Finish
  *
  * Why the operator finishes the campaign.
@@ -1855,6 +1895,29 @@ export type FlyingTrial = {
      * Trial Number
      */
     trial_number: number;
+};
+
+/**
+ * FoundShapeField
+ *
+ * A shape of failure in the flight.
+ */
+export type FoundShapeField = {
+    code: FailureShape;
+    /**
+     * Numbers
+     *
+     * by names that end in their unit; 1: a share or a number
+     */
+    numbers: {
+        [key: string]: number;
+    };
+    /**
+     * Since S
+     *
+     * when it is seen first, s of the recording
+     */
+    since_s: number;
 };
 
 /**
@@ -3400,6 +3463,12 @@ export type PartTexts = {
      * Facts
      */
     facts: Array<Facts>;
+    /**
+     * Shapes
+     *
+     * the part's shapes of failure, in the same order
+     */
+    shapes: Array<ShapeTexts>;
     table: TextTable | null;
     /**
      * Notes
@@ -3973,6 +4042,36 @@ export type Run = {
      * the long version, if there is one
      */
     full?: boolean;
+};
+
+/**
+ * ShapeTexts
+ *
+ * One that was found.
+ */
+export type ShapeTexts = {
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Recognised
+     *
+     * how the program recognises it
+     */
+    recognised: string;
+    /**
+     * Advice
+     *
+     * what to do
+     */
+    advice: string;
+    /**
+     * Found
+     *
+     * with the numbers of this log
+     */
+    found: string;
 };
 
 /**
@@ -4891,6 +4990,12 @@ export type TuningAnswer = {
      * the whole flight as it was flown
      */
     description: Description | null;
+    /**
+     * Shapes
+     *
+     * shapes of failure in the whole flight
+     */
+    shapes: Array<FoundShapeField>;
     /**
      * Numbers
      */
@@ -8720,6 +8825,33 @@ export type RenameLoggedVehicleResponses = {
 };
 
 export type RenameLoggedVehicleResponse = RenameLoggedVehicleResponses[keyof RenameLoggedVehicleResponses];
+
+export type ListFailureShapesData = {
+    body?: never;
+    path?: never;
+    query?: never;
+    url: '/api/failure-shapes';
+};
+
+export type ListFailureShapesErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ListFailureShapesError = ListFailureShapesErrors[keyof ListFailureShapesErrors];
+
+export type ListFailureShapesResponses = {
+    /**
+     * Response List Failure Shapes
+     *
+     * Successful Response
+     */
+    200: Array<AtlasShape>;
+};
+
+export type ListFailureShapesResponse = ListFailureShapesResponses[keyof ListFailureShapesResponses];
 
 export type CompareFlightsData = {
     body?: never;
