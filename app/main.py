@@ -80,7 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         reproductions,
         log_library.router,
         log_library.vehicles,
-        log_library.shapes,
+        log_library.failure_shapes,
         compare,
         reports,
         bundles,

@@ -32,7 +32,6 @@ from app.log_library import descriptions, manoeuvres, replicas, shapes, takeoffs
 from app.log_library.flights import pack_flight
 from app.log_library.library_schemas import LogNumbers
 from app.log_library.schemas import (
-    FoundShapeField,
     LogAnswer,
     Part,
     PartTexts,
@@ -188,11 +187,10 @@ def _tuning(reader: Reader, recording: Recording, name: str) -> _Answered[Tuning
         return found
     facts = [*found.texts.facts, descriptions.flight_facts(description)]
     seen = find_shapes(signals, description)
-    fields = [FoundShapeField.view_of(each, code=each.shape) for each in seen]
     return replace(
         found,
         numbers=found.numbers.completed_by(description),
-        answer=found.answer.model_copy(update={"description": description, "shapes": fields}),
+        answer=found.answer.model_copy(update={"description": description, "shapes": shapes.fields_of(seen)}),
         texts=found.texts.model_copy(update={"facts": facts, "shapes": shapes.texts_of(seen)}),
     )
 

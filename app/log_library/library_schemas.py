@@ -17,7 +17,7 @@ from app.figures.base import Card
 from app.figures.panels import Plot
 from app.figures.theme import ThemeName
 from app.log_library.parameter_changes import ParameterChange
-from app.log_library.schemas import EstimatedValue, LogAnswer, Part
+from app.log_library.schemas import EstimatedValue, LogAnswer, Part, ShapeWords
 
 
 class LogNumbers(Schema):
@@ -167,11 +167,8 @@ class LoggedVehicleDetails(LoggedVehicle):
     combined: Annotated[CombinedVehicle | None, Field(description="null: fewer than two logs tell the vehicle")]
 
 
-class AtlasShape(Schema):
+class AtlasShape(ShapeWords):
     """A shape of failure in the atlas."""
 
     code: FailureShape
-    title: str
-    recognised: Annotated[str, Field(description="how the program recognises it")]
-    advice: Annotated[str, Field(description="what to do")]
     figures: Annotated[dict[ThemeName, Card], Field(description="of a simulated flight with it, by theme")]

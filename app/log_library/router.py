@@ -10,7 +10,7 @@ from app.campaigns.schemas import Campaign
 from app.common.schemas import Page, uploaded_name
 from app.documents.html import chart_library
 from app.figures.base import Card
-from app.log_library import comparisons, documents, service, stored_logs, trends
+from app.log_library import comparisons, documents, service, shapes, stored_logs, trends
 from app.log_library.library_schemas import (
     AnalysedLog,
     AtlasShape,
@@ -44,14 +44,14 @@ SystemId = Annotated[int | None, Query(ge=0, le=255, description="system id, if 
 RegisteredVehicle = Annotated[int | None, Query(ge=1, le=2**63 - 1)]
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 vehicles = APIRouter(prefix="/api/logged-vehicles", tags=["log analyses"])
-shapes = APIRouter(prefix="/api/failure-shapes", tags=["log analyses"])
+failure_shapes = APIRouter(prefix="/api/failure-shapes", tags=["log analyses"])
 
 
-@shapes.get("")
+@failure_shapes.get("")
 def list_failure_shapes() -> Sequence[AtlasShape]:
     """List the shapes of failure that a log is searched for: how each is recognised, what to do, and what it looks like
     in a simulated flight."""
-    return service.list_failure_shapes()
+    return shapes.atlas()
 
 
 @router.post("", openapi_extra=REQUEST_BODY)

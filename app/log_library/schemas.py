@@ -150,12 +150,17 @@ class Facts(Schema):
     values: Sequence[str]
 
 
-class ShapeTexts(Schema):
+class ShapeWords(Schema):
     """A shape of failure for a person."""
 
     title: str
     recognised: Annotated[str, Field(description="how the program recognises it")]
     advice: Annotated[str, Field(description="what to do")]
+
+
+class ShapeTexts(ShapeWords):
+    """One that was found."""
+
     found: Annotated[str, Field(description="with the numbers of this log")]
 
 

@@ -23,8 +23,7 @@ from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 from app.log_library import stored_logs
-from app.log_library.library_schemas import AtlasShape, LogAnalysis
-from app.log_library.shapes import atlas
+from app.log_library.library_schemas import LogAnalysis
 from app.log_library.takeoffs import logged_takeoffs
 from app.processes.calls import FILE, run_limited
 
@@ -75,11 +74,6 @@ def analyze_upload(
 def analyze_example(database: Database) -> LogAnalysis:
     """Analyse the log that comes with the program."""
     return analyze_upload(database, gzip.decompress(EXAMPLE.read_bytes()), None, name=EXAMPLE.stem)
-
-
-def list_failure_shapes() -> Sequence[AtlasShape]:
-    """The atlas of failure shapes."""
-    return atlas()
 
 
 def read_upload(

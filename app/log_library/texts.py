@@ -52,7 +52,7 @@ _SENTENCES: Final[Mapping[Verdict | None, str]] = {
     "worse": "The later gains are worse.",
     "unresolved": "The gains differ by less than two flights with the same gains do.",
     "not known yet": "The gains are not compared: a log does not have what its model needs.",
-    None: "Both logs have the same gains.",
+    None: "Both logs have the same altitude gains.",
 }
 _CONTRADICTED: Final = (
     "The flights went the other way. The weather has changed much, or something happened that the model does not know: "

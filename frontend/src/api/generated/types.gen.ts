@@ -199,7 +199,6 @@ export type AnalysedLog = {
  * A shape of failure in the atlas.
  */
 export type AtlasShape = {
-    code: FailureShape;
     /**
      * Title
      */
@@ -216,6 +215,7 @@ export type AtlasShape = {
      * what to do
      */
     advice: string;
+    code: FailureShape;
     /**
      * Figures
      *
@@ -4074,7 +4074,7 @@ export type Run = {
 /**
  * ShapeTexts
  *
- * A shape of failure for a person.
+ * One that was found.
  */
 export type ShapeTexts = {
     /**
