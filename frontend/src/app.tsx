@@ -10,6 +10,8 @@ import { NotFoundPage } from "./ui/NotFound";
 
 const ComparePage = lazyPage("ComparePage");
 const LogAnalysisPage = lazyPage("LogAnalysisPage");
+const LogPage = lazyPage("LogPage");
+const LoggedVehiclePage = lazyPage("LoggedVehiclePage");
 const EditVehiclePage = lazyPage("EditVehiclePage");
 const FlightPage = lazyPage("FlightPage");
 const FlyPage = lazyPage("FlyPage");
@@ -38,6 +40,8 @@ export function App() {
         <Route path="/vehicles/:vehicleId/edit" component={EditVehiclePage} />
         <Route path="/reproductions" component={ReproductionsPage} />
         <Route path="/log-analysis" component={LogAnalysisPage} />
+        <Route path="/log-analysis/:logId" component={LogPage} />
+        <Route path="/log-analysis/vehicles/:vehicleId" component={LoggedVehiclePage} />
         <Route path="/jobs" component={JobsPage} />
         <Route path="/settings" component={SettingsPage} />
         <Route path="/controller/*?">

@@ -10,5 +10,7 @@ export { FlyPage } from "./features/fly/FlyPage";
 export { JobsPage } from "./features/jobs/JobsPage";
 export { ReproductionsPage } from "./features/jobs/ReproductionsPage";
 export { LogAnalysisPage } from "./features/log-analysis/LogAnalysisPage";
+export { LoggedVehiclePage } from "./features/log-analysis/LoggedVehiclePage";
+export { LogPage } from "./features/log-analysis/LogPage";
 export { NewCampaignPage } from "./features/new-campaign/NewCampaignPage";
 export { SettingsPage } from "./features/settings/SettingsPage";

@@ -5,13 +5,15 @@ flown by the simulated vehicle. Every flight is one transaction together with th
 worker of a running server finds nothing to do; browsers are told of it as of any other change.
 """
 
+import gzip
 import io
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import count
 from pathlib import Path
 from typing import Any, Final, TypeVar
+from uuid import uuid4
 
 from sqlalchemy import delete
 from sqlalchemy.orm import Session
@@ -35,6 +37,9 @@ from app.fleet.schemas import NewVehicle
 from app.flights import flight_rows
 from app.flights import service as flights
 from app.jobs import service as jobs
+from app.log_library import service as log_library
+from app.log_library import stored_logs
+from app.log_library.service import EXAMPLE
 from app.reproductions import service as reproductions
 from app.reproductions.registry import REPRODUCTIONS
 from app.vehicles.base import FlightOptions
@@ -209,6 +214,23 @@ class States:
                     session.execute(delete(table))
 
         self._write(empty)
+
+    # ---- logs
+
+    def store_logs(self, *, hardware_id: str = "", logs: int = 1) -> list[int]:
+        """The example log, analysed once and stored so many times; the logs' ids."""
+        found = log_library.analyze(gzip.decompress(EXAMPLE.read_bytes()), None, name=EXAMPLE.stem)
+        found = replace(found, hardware_id=hardware_id)
+        return [self._write(lambda s: stored_logs.store(s, found, uuid4().hex, "")) for _ in range(logs)]
+
+    def keep_log(self, log_id: int, vehicle: str) -> int:
+        """Keep a log as a flight of that vehicle; the vehicle's id."""
+        kept = self._write(lambda session: stored_logs.keep(session, log_id, vehicle)).vehicle
+        assert kept is not None
+        return kept.id
+
+    def rename_logged_vehicle(self, vehicle_id: int, name: str) -> None:
+        self._write(lambda session: stored_logs.rename_vehicle(session, vehicle_id, name))
 
     # ---- one transaction each
 

@@ -1,5 +1,5 @@
-"""The page of a log analysis: a log dropped and chosen, its answer, the parameter file, the comparison with the
-replica, and logs that are refused."""
+"""The pages of log analysis: a log dropped and chosen, its answer, the parameter file, the comparison with the replica,
+logs that are refused; and the library: kept logs of a vehicle, compared, shared and deleted."""
 
 import re
 from base64 import b64encode
@@ -11,6 +11,7 @@ from playwright.sync_api import FilePayload, expect
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded
 from tests.logs.written import ardupilot_log
@@ -34,10 +35,10 @@ def page_of_analysis(open_dashboard: Opener, empty_server: Server) -> Dashboard:
     return dashboard
 
 
-def choose(dashboard: Dashboard, name: str, content: bytes, companion: str = "") -> None:
+def choose(dashboard: Dashboard, name: str, content: bytes, companion: str = "", *, button: str = "Choose log") -> None:
     files = {name: content} | ({"flight.log": companion.encode()} if companion else {})
     with dashboard.page.expect_file_chooser() as chooser:
-        dashboard.button("Choose log").click()
+        dashboard.button(button).click()
     chooser.value.set_files(
         [FilePayload(name=each, mimeType="application/octet-stream", buffer=it) for each, it in files.items()]
     )
@@ -97,6 +98,8 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
     kp = rows.nth(1).locator("td").all_inner_texts()[1]
     assert f'<define name="HOVER_KP" value="{kp}"/>' in content
     proposed = rows.nth(1).locator("td").all_inner_texts()[1:4]
+    page.reload()  # its takeoffs are in the file alone
+    choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"), button="Choose takeoff.tlog")
     dashboard.button("Start campaign").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("takeoff")
     assert [trial["gains"] for trial in dashboard.trials(dashboard.campaign_id)] == [{"kp": 283, "ki": 13, "kd": 82}]
@@ -109,11 +112,11 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
 def test_a_log_that_gives_no_gains_says_why_and_tells_what_it_can(page_of_analysis: Dashboard) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.bin", recorded("px4_takeoff.ulg"))
-    headings = page.get_by_role("article", name="Analysis of takeoff.bin").get_by_role("heading", level=2)
-    expect(headings.first).to_have_text("takeoff.bin")
+    article = page.get_by_role("article", name="Analysis of takeoff.bin")
+    expect(article.get_by_role("heading", level=1)).to_have_text("takeoff.bin")
+    headings = article.get_by_role("heading", level=2)
     expect(headings.nth(1)).to_have_text("Gains")
     expect(headings.nth(2)).to_have_text("Replica of the controller")
-    article = page.get_by_role("article")
     expect(article).to_contain_text("Partial answer")
     expect(article).to_contain_text("left out: 9.4 s (only takeoffs or landings)")
     expect(article.get_by_label("Whole flight")).to_contain_text("Hover throttle")
@@ -124,15 +127,12 @@ def test_a_log_that_gives_no_gains_says_why_and_tells_what_it_can(page_of_analys
     expect(page.get_by_text("Full answer")).to_be_visible()
 
 
-def test_one_click_shows_what_the_replica_is(page_of_analysis: Dashboard) -> None:
+def test_one_click_shows_what_an_answer_is(page_of_analysis: Dashboard) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
-    dashboard.button("Analyse example").click()
-    expect(page.get_by_text("The replica agrees: all 8\N{NARROW NO-BREAK SPACE}192 steps are exact")).to_be_visible()
-    shown = page.get_by_role("region", name="Difference of every signal").locator("tbody tr").all_inner_texts()
-    assert len(shown) == 7
-    assert all("0 counts" in row and "exact" in row for row in shown)
-    told = dashboard.get("/log-analyses/example")["figures"]["light"]["replica"]
-    for card in told:
+    dashboard.button("Analyse example log").click()
+    expect(page.get_by_text("The replica agrees: all 238 logged rows")).to_be_visible()
+    told = dashboard.get(f"/log-analyses/{page.url.rpartition('/')[2]}")["figures"]["light"]
+    for card in [*told["tuning"], *told["replica"]]:
         expect(dashboard.plot(card["title"])).to_be_visible()
         drawn = dashboard.traces(card["title"])
         assert [(one["meta"], one["x"], one["y"]) for one in drawn] == [
@@ -182,3 +182,81 @@ def test_the_same_log_can_be_sent_again_and_another_theme_sends_nothing(page_of_
     page.get_by_role("button", name=re.compile("^Switch to the")).click()
     expect(page.get_by_role("alert")).to_contain_text("is not a log")
     assert len(sent) == 2
+
+
+def keep(dashboard: Dashboard, name: str) -> None:
+    dashboard.page.get_by_label("Vehicle", exact=True).fill(name)
+    dashboard.button("Keep").click()
+    expect(dashboard.page.get_by_role("heading", name=f"Kept as a log of {name}")).to_be_visible()
+
+
+def test_a_log_is_kept_found_again_compared_shared_and_deleted(
+    page_of_analysis: Dashboard, open_dashboard: Opener, states: States
+) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    [earlier] = states.store_logs()
+    states.keep_log(earlier, "Bee")
+    choose(dashboard, "steps.bin", recorded("arducopter_lateral_steps.bin"))
+    article = page.get_by_role("article", name="Analysis of steps.bin")
+    expect(article).to_contain_text("It is deleted seven days later")
+    address = page.url
+    page.get_by_label("Store the file too").check()
+    keep(dashboard, "Bee")
+    compared = dashboard.panel("Compared with")
+    expect(compared.get_by_label("Compared with")).to_have_value(str(earlier))
+    expect(compared.get_by_role("region", name="Numbers of both logs").locator("tbody tr")).to_have_count(4)
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Log file").click()
+    assert Path(download.value.path()).read_bytes() == recorded("arducopter_lateral_steps.bin")
+
+    page.reload()
+    expect(dashboard.panel("Kept as a log of Bee")).to_be_visible()
+    shared = open_dashboard(dashboard.url, alone=True, unlocked=False)
+    shared.open(address.removeprefix(dashboard.url))
+    expect(shared.page.get_by_role("article")).to_contain_text("Kept as a log of Bee")
+    shared.page.get_by_role("link", name="Bee").click()
+    expect(shared.page.get_by_role("region", name="Logs of Bee").locator("tbody tr")).to_have_count(2)
+    expect(shared.plot("Trend")).to_be_visible()
+    shared.page.get_by_role("link", name="Compare", exact=True).click()
+    expect(shared.panel("Compared with").get_by_label("Compared with")).to_have_value(str(earlier))
+
+    choose(dashboard, "the same.bin", recorded("arducopter_lateral_steps.bin"))
+    expect(page.get_by_text("Analysed before, on ")).to_be_visible()
+    assert page.url == address
+    dashboard.button("Delete log").click()
+    dashboard.button("Delete log").click()
+    expect(page.get_by_role("heading", name="Log analysis", level=1)).to_be_visible()
+    expect(page.get_by_role("region", name="Kept logs", exact=True).locator("tbody tr")).to_have_count(1)
+    shared.page.reload()
+    expect(shared.page.get_by_role("heading", name="Page not found")).to_be_visible()
+
+
+def test_a_campaign_starts_from_a_stored_log_once_a_vehicle_can_fly_it(dashboard: Dashboard, states: States) -> None:
+    [log_id] = states.store_logs()
+    dashboard.open(f"/log-analysis/{log_id}")
+    dashboard.button("Start campaign").click()
+    expect(dashboard.page.get_by_role("alert")).to_contain_text("Register the vehicle of the log")
+    options = {"address": "udp:127.0.0.1:14997@14996", "autopilot": "ardupilot", "simulated": True}
+    states.vehicle("Bee", options=options)
+    dashboard.button("Start campaign").click()
+    expect(dashboard.page.get_by_role("heading", level=1)).to_have_text("arducopter_steps")
+
+
+def test_a_vehicle_is_recognised_by_its_hardware_id_whatever_its_name_is_by_then(
+    dashboard: Dashboard, states: States
+) -> None:
+    page = dashboard.page
+    first, second = states.store_logs(hardware_id="0039004a3131510a34373830", logs=2)
+    vehicle_id = states.keep_log(first, "Bee")
+    dashboard.open(f"/log-analysis/{second}")
+    expect(page.get_by_text("Recognised by its hardware id.")).to_be_visible()
+    states.rename_logged_vehicle(vehicle_id, "Wasp")
+    dashboard.button("Keep as a log of Bee").click()
+    expect(page.get_by_role("alert")).to_contain_text("its hardware id is that of Wasp")
+    dashboard.button("Keep as a log of Wasp").click()
+    expect(page.get_by_role("heading", name="Kept as a log of Wasp")).to_be_visible()
+    page.get_by_role("link", name="Wasp").click()
+    page.get_by_text("Rename", exact=True).click()
+    page.get_by_label("Name").fill("Hornet")
+    dashboard.button("Save").click()
+    expect(page.get_by_role("heading", name="Hornet")).to_be_visible()

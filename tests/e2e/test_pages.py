@@ -22,7 +22,7 @@ from tests.e2e.states import States
 
 ROOT = Path(__file__).parents[2]
 SCREENSHOTS = ROOT / "var" / "screenshots"
-README_IMAGE = ROOT / "docs" / "images" / "campaign.png"
+IMAGES = ROOT / "docs" / "images"
 ROUTES = ROOT / "frontend" / "src" / "app.tsx"
 SIZES = {"desk": DESK, "tablet": TABLET, "phone": PHONE, "wide": WIDE}
 ARE_KEPT = "GAINLINE_SCREENSHOTS" in os.environ
@@ -160,6 +160,26 @@ class Pages:
         return f"/compare?trial={self.flights_under_way[1][1]}&trial={self.flights_finished[1][0]}"
 
     @cached_property
+    def kept_log(self) -> tuple[int, int]:
+        """A vehicle with two logs, and the later one."""
+        earlier, later = self._states.store_logs(logs=2)
+        self._states.keep_log(earlier, "Bee")
+        return self._states.keep_log(later, "Bee"), later
+
+    @cached_property
+    def log_analysis(self) -> str:
+        _ = self.kept_log
+        return "/log-analysis"
+
+    @cached_property
+    def log(self) -> str:
+        return f"/log-analysis/{self.kept_log[1]}"
+
+    @cached_property
+    def logged_vehicle(self) -> str:
+        return f"/log-analysis/vehicles/{self.kept_log[0]}"
+
+    @cached_property
     def jobs(self) -> str:
         _ = self.under_way, self.reproductions
         return "/jobs"
@@ -167,8 +187,7 @@ class Pages:
 
 FIXED = {
     "new": "/new",
-    "log-analysis": "/log-analysis",
-    "log-analysed": "/controller",
+    "no-logs": "/controller",
     "new-vehicle": "/vehicles/new",
     "settings": "/settings",
     "missing": "/no/such/page",
@@ -185,8 +204,10 @@ NAMES: dict[str, tuple[str, ...]] = {
     "vehicles/:vehicleId": ("vehicle", "shared-vehicle"),
     "vehicles/:vehicleId/edit": ("edit-vehicle",),
     "reproductions": ("reproductions",),
+    "controller/*?": ("no-logs",),
     "log-analysis": ("log-analysis",),
-    "controller/*?": ("log-analysed",),
+    "log-analysis/:logId": ("log",),
+    "log-analysis/vehicles/:vehicleId": ("logged-vehicle",),
     "jobs": ("jobs",),
     "settings": ("settings",),
     "*": ("missing",),
@@ -256,9 +277,6 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
     dashboard = open_dashboard(shared_server.url, viewport=DESK)
     page = dashboard.page
     dashboard.open(pages.path(name))
-    if name == "log-analysed":
-        dashboard.button("Analyse example").click()
-        expect(page.get_by_role("article")).to_be_visible()
     refused = []
     for look in LOOKS:
         state = f"{name}-{look.size}-{look.theme}"
@@ -319,13 +337,16 @@ def test_every_route_of_the_dashboard_is_among_these_pages() -> None:
 @pytest.mark.skipif(
     not os.environ.get("GAINLINE_README_IMAGE"), reason="set GAINLINE_README_IMAGE=1 to renew the image"
 )
-def test_the_image_of_the_readme_is_taken(dashboard: Dashboard, states: States) -> None:
-    campaign_id = states.campaign(name="AR.Drone takeoff to 3 m, twin", seed=4, flights=4)
-    dashboard.open_campaign(campaign_id)
-    dashboard.settled()
-    README_IMAGE.parent.mkdir(parents=True, exist_ok=True)
-    clip = FloatRect(x=0, y=0, width=1024, height=1120)
-    dashboard.page.screenshot(path=README_IMAGE, clip=clip, full_page=True)
+def test_the_images_of_the_readme_are_taken(dashboard: Dashboard, states: States) -> None:
+    pages = {
+        "campaign": f"/campaigns/{states.campaign(name='AR.Drone takeoff to 3 m, twin', seed=4, flights=4)}",
+        "log": f"/log-analysis/{states.store_logs()[0]}",
+    }
+    for name, path in pages.items():
+        dashboard.open(path)
+        dashboard.settled()
+        clip = FloatRect(x=0, y=0, width=1024, height=1120)
+        dashboard.page.screenshot(path=IMAGES / f"{name}.png", clip=clip, full_page=True)
 
 
 def test_the_theme_is_switched_and_kept_and_no_chart_offers_to_upload_itself(

@@ -16,7 +16,7 @@ const joined = <Item>({ pages }: InfiniteData<Page<Item>>) => ({
 });
 
 /** The items of the pages read so far, and how many there are in all. */
-export function usePages<Item>(queryKey: QueryKey, limit: number, read: Read<Item>) {
+export function usePages<Item>(queryKey: QueryKey, limit: number, read: Read<Item>, options?: { staleTime: number }) {
   return useInfiniteQuery({
     queryKey,
     queryFn: ({ pageParam: cursor }) => read({ limit, cursor }),
@@ -24,6 +24,7 @@ export function usePages<Item>(queryKey: QueryKey, limit: number, read: Read<Ite
     getNextPageParam: ({ next_cursor }) => next_cursor,
     placeholderData: keepPreviousData,
     select: joined,
+    ...options,
   });
 }
 

@@ -7,10 +7,10 @@ import classes from "./MainNav.module.css";
 /** Pages with `inRow` are in the row on wide screens. The menu has all pages on small screens, else the rest. */
 const PAGES = [
   { to: "/", title: "Campaigns", inRow: true },
+  { to: "/log-analysis", title: "Log analysis", inRow: true },
   { to: "/vehicles", title: "Vehicles", inRow: true },
   { to: "/compare", title: "Compare", inRow: false },
   { to: "/reproductions", title: "Reproductions", inRow: false },
-  { to: "/log-analysis", title: "Log analysis", inRow: false },
   { to: "/jobs", title: "Jobs", inRow: false },
   { to: "/settings", title: "Settings", inRow: false },
 ] as const;

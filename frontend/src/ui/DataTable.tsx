@@ -10,12 +10,19 @@ function cell(value: string | number | null, digits: number | null): string {
 
 type Row = FigureTable["rows"][number];
 
+interface Props {
+  table: FigureTable;
+  label: string;
+  /** In px; without it as high as its rows, which are few and are stacked where the screen is narrow. */
+  height?: number;
+}
+
 /** The data of a figure as a table. */
-export function DataTable({ table, label, height }: { table: FigureTable; label: string; height: number }) {
+export function DataTable({ table, label, height }: Props) {
   return (
     <ListTable
       label={label}
-      height={height}
+      {...(height === undefined ? { stacks: true } : { height })}
       rows={table.rows}
       keyOf={([first]) => String(first)}
       what="rows"

@@ -38,6 +38,8 @@ interface RowProps<Row> {
   marks?: (row: Row) => Readonly<Record<`data-${string}`, string | number | boolean | undefined>>;
   /** A second line of a row, across all columns. */
   below?: (row: Row) => ReactNode;
+  /** Whether, where the screen is too narrow, the cells of a row stand below each other, each beside its title. */
+  stacks?: boolean;
 }
 
 interface Props<Row> extends RowProps<Row>, ComponentProps<"section"> {
@@ -65,6 +67,7 @@ export function ListTable<Row extends RowData>({
   columns,
   marks,
   below,
+  stacks = false,
   rows,
   keyOf,
   what,
@@ -114,7 +117,7 @@ export function ListTable<Row extends RowData>({
       // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
       tabIndex={0}
     >
-      <table className={`${classes["list"]} ${className}`}>
+      <table className={`${classes["list"]} ${className}`} data-stacks={stacks || undefined}>
         <thead>
           <tr>
             {columns.map((column) => {
@@ -139,7 +142,7 @@ export function ListTable<Row extends RowData>({
             {shown
               .filter((row) => bodyOf(row) === name)
               .map((row) => (
-                <Lines key={keyOf(row)} {...{ row, columns, marks, below }} />
+                <Lines key={keyOf(row)} {...{ row, columns, marks, below, stacks }} />
               ))}
           </tbody>
         ))}
@@ -178,7 +181,7 @@ function Title<Row>({ column, sorted, onSort }: TitleProps<Row>) {
   );
 }
 
-function Lines<Row>({ row, columns, marks, below }: RowProps<Row> & { row: Row }) {
+function Lines<Row>({ row, columns, marks, below, stacks }: RowProps<Row> & { row: Row }) {
   const more = below?.(row);
   return (
     <>
@@ -187,7 +190,12 @@ function Lines<Row>({ row, columns, marks, below }: RowProps<Row> & { row: Row }
           const { title, id = title, isHeading, cell } = column;
           const Cell = isHeading ? "th" : "td";
           return (
-            <Cell key={id} scope={isHeading ? "row" : undefined} className={classOf(column)}>
+            <Cell
+              key={id}
+              scope={isHeading ? "row" : undefined}
+              className={classOf(column)}
+              data-title={stacks ? title : undefined}
+            >
               {cell(row)}
             </Cell>
           );

@@ -10,6 +10,8 @@ import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
+import { ChooseLog, Progress } from "../log-analysis/ChooseLog";
+import { useAnalysis } from "../log-analysis/useAnalysis";
 import { choicesOf } from "../new-campaign/newCampaign";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignListPage.module.css";
@@ -34,11 +36,12 @@ export function CampaignListPage() {
   const [vehicle, setVehicle] = useState("");
   const [sort, setSort] = useState<Sort>("-updated");
   const [sought] = useDebouncedValue(search.trim(), 200);
+  const analysis = useAnalysis();
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
   const filtered = sought !== "" || state !== "All" || vehicle !== "";
   const campaigns = useCampaigns({ search: sought, state: STATES[state], vehicle: vehicle ? [vehicle] : [], sort });
   const found = campaigns.data?.items ?? [];
-  if (campaigns.data?.total === 0 && !filtered) return <FirstCampaign />;
+  if (campaigns.data?.total === 0 && !filtered) return <FirstCampaign analysis={analysis} />;
   return (
     <>
       <Group gap={12} mb={14}>
@@ -48,8 +51,10 @@ export function CampaignListPage() {
         <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
           New campaign
         </Button>
+        <ChooseLog analysis={analysis}>Analyse log</ChooseLog>
         <ImportBundle />
       </Group>
+      <Progress analysis={analysis} />
       <Group component="search" gap={10} mb={18} className={classes["filters"]}>
         <TextInput
           flex="1 1 160px"

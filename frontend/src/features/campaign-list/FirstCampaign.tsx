@@ -1,12 +1,14 @@
-import { Anchor, Box, Button, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Box, Button, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
-import panel from "../../ui/Panel.module.css";
+import { Panel } from "../../ui/Panel";
 import page from "../campaign/CampaignPage.module.css";
+import { LogDrop, Progress } from "../log-analysis/ChooseLog";
+import type { OngoingAnalysis } from "../log-analysis/useAnalysis";
 import { firstPreset, openCampaign } from "../new-campaign/newCampaign";
 import { ImportBundle } from "./ImportBundle";
 
@@ -19,50 +21,65 @@ const STEPS = [
   ["Step", "Gainline proposes the best of many gain sets on the model. You see why, and decide."],
 ] as const;
 
-/** Empty list: explains campaigns, and creates the first one with one click. */
-export function FirstCampaign() {
+/** Empty list: two ways to begin, a campaign that is created with one click, or one log. */
+export function FirstCampaign({ analysis }: { analysis: OngoingAnalysis }) {
   const catalogue = useCatalogue();
   const create = useCreateCampaign();
   const preset = catalogue.data && firstPreset(catalogue.data);
   return (
-    <Stack component="section" align="center" gap={14} maw={820} mx="auto" mt="3vh" ta="center">
-      <Drawing />
-      <Title order={1} lh={1.15}>
-        Tune a takeoff in a few flights
-      </Title>
-      <Note maw={560} fz="strong" lh={1.5}>
-        A campaign flies one vehicle repeatedly, each time with new gains, and stops when no further improvement is
-        found.
-      </Note>
-      <SimpleGrid component="ol" minColWidth={210} autoFlow="auto-fit" spacing={14} w="100%" mt={8} mb={10} ta="left">
-        {STEPS.map(([title, text], index) => (
-          <li key={title} className={panel["panel"]}>
-            <Text fz="body" fw={650}>
-              <Text span inherit c="var(--best)">
-                {index + 1}.
-              </Text>{" "}
-              {title}
-            </Text>
-            <Note fz="body">{text}</Note>
-          </li>
-        ))}
+    <Stack component="section" gap={14} maw={1100} mx="auto" mt="2vh">
+      <Stack align="center" gap={10} ta="center">
+        <Drawing />
+        <Title order={1} lh={1.15}>
+          Tune a takeoff in a few flights
+        </Title>
+        <Note maw={560} fz="strong" lh={1.5}>
+          Begin with a campaign, which flies one vehicle repeatedly, or with the log of one flight.
+        </Note>
+      </Stack>
+      <Progress analysis={analysis} />
+      <SimpleGrid minColWidth="min(320px, 100%)" autoFlow="auto-fit" spacing="var(--gap)">
+        <Panel title="A campaign">
+          <Stack component="ol" gap={8} mb={16}>
+            {STEPS.map(([title, text], index) => (
+              <Text key={title} component="li" lh={1.45}>
+                <Text span inherit fw={650} c="var(--best)">
+                  {index + 1}. {title}.
+                </Text>{" "}
+                {text}
+              </Text>
+            ))}
+          </Stack>
+          <Button
+            size="lg"
+            maw="100%"
+            className={page["wrapping"]}
+            loading={create.isPending}
+            disabled={preset === undefined}
+            leftSection={<IconPlus size={22} aria-hidden />}
+            onClick={() => preset && create.mutate(preset.campaign, { onSuccess: openCampaign })}
+          >
+            Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”
+          </Button>
+          <Group gap="4px 18px" mt={8}>
+            <Anchor component={Link} to="/new" display="inline-block" py={12}>
+              Choose a preset or settings first
+            </Anchor>
+            <ImportBundle />
+          </Group>
+          <ErrorNotice error={catalogue.error ?? create.error} />
+        </Panel>
+        <LogDrop analysis={analysis} title="One log">
+          <Text lh={1.45} mb={8}>
+            Drop the log of a flight with climbs, descents and hover: ArduCopter's .bin, PX4's .ulg, a .tlog, or
+            Paparazzi's .data.
+          </Text>
+          <Text lh={1.45}>
+            You get the measured deviation, the fitted vehicle, and better gains as a parameter file. Kept as a flight
+            of its vehicle, the log is compared with the next one.
+          </Text>
+        </LogDrop>
       </SimpleGrid>
-      <Button
-        size="lg"
-        maw="100%"
-        className={page["wrapping"]}
-        loading={create.isPending}
-        disabled={preset === undefined}
-        leftSection={<IconPlus size={22} aria-hidden />}
-        onClick={() => preset && create.mutate(preset.campaign, { onSuccess: openCampaign })}
-      >
-        Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”
-      </Button>
-      <Anchor component={Link} to="/new" display="inline-block" py={12}>
-        Choose a preset or settings first
-      </Anchor>
-      <ImportBundle />
-      <ErrorNotice error={catalogue.error ?? create.error} />
     </Stack>
   );
 }

@@ -1,46 +1,9 @@
 /** Acts that end a campaign, each after a question. */
 
-import { Button, Group, Stack } from "@mantine/core";
-import { useState } from "react";
 import { navigate } from "wouter/use-browser-location";
 import { useArchive, useDeleteCampaign, useFinish } from "../../api/mutations";
 import type { Campaign } from "../../api/types";
-import { Note } from "../../ui/Note";
-import { ErrorNotice } from "../../ui/Notices";
-
-interface QuestionProps {
-  /** What is done, on both buttons. */
-  act: string;
-  question: string;
-  otherwise: string;
-  /** Does it, and how far that has come. */
-  mutation: { error: unknown; isPending: boolean; mutate: () => void };
-}
-
-function Question({ act, question, otherwise, mutation }: QuestionProps) {
-  const [asking, setAsking] = useState(false);
-  if (!asking) {
-    return (
-      <Button variant="subtle" color="gray" c="var(--dim)" onClick={() => setAsking(true)}>
-        {act}
-      </Button>
-    );
-  }
-  return (
-    <Stack gap={14}>
-      <Note fz="body">{question}</Note>
-      <Group grow gap={8}>
-        <Button variant="default" onClick={() => setAsking(false)}>
-          {otherwise}
-        </Button>
-        <Button color="red" loading={mutation.isPending} onClick={() => mutation.mutate()}>
-          {act}
-        </Button>
-      </Group>
-      <ErrorNotice error={mutation.error} />
-    </Stack>
-  );
-}
+import { Question } from "../../ui/Question";
 
 /** Ends the campaign between flights; planned trials are cancelled. */
 export function StopCampaign({ campaignId }: { campaignId: number }) {

@@ -1,8 +1,6 @@
-import { Button, Group, SimpleGrid, Text, Title, useComputedColorScheme } from "@mantine/core";
-import { IconDownload } from "@tabler/icons-react";
+import { Button, Group, SimpleGrid, Text, useComputedColorScheme } from "@mantine/core";
 import type { ReactNode } from "react";
-import type { LogAnalysis, PartTexts, TuningAnswer } from "../../api/logAnalyses";
-import type { RecordFiles } from "../../api/records";
+import { type LogAnalysis, type PartTexts, useSentLog } from "../../api/logAnalyses";
 import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { StateBadge } from "../../ui/Badges";
@@ -11,35 +9,29 @@ import { gainText } from "../../ui/format";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { bad, good, quiet, type StateLabel } from "../../ui/states";
+import { FileNeeded } from "./ChooseLog";
+import { Download } from "./Downloads";
 import { Flight } from "./Flight";
 import { GainsAsked } from "./GainsAsked";
-import { LoggedVehicles } from "./LoggedVehicles";
+import { GRADES } from "./readings";
 import { StartCampaign } from "./StartCampaign";
+import type { OngoingAnalysis } from "./useAnalysis";
+import { VehiclesInLog } from "./VehiclesInLog";
 
 const FIGURE_HEIGHT_PX = 560;
-const ROW_PX = 41;
-const HEADER_PX = 64;
-
-const GRADES: Record<TuningAnswer["grade"], StateLabel> = {
-  full: good("Full answer"),
-  partial: quiet("Partial answer"),
-  description: quiet("Description only"),
-  refused: bad("No answer"),
-};
 
 interface Props {
-  analysis: LogAnalysis;
-  /** Null: the example. */
-  files: RecordFiles | null;
-  /** Analyse the log again with these gains, `KP,KI,KD`. */
-  onGains: (gains: string) => void;
-  /** Analyse another vehicle of the log, by its system id. */
-  onVehicle: (system: number) => void;
+  answer: LogAnalysis;
+  /** Analyses the log again with other gains, or another vehicle of it. */
+  analysis: OngoingAnalysis;
 }
 
 /** The answers of a log, as far as it gives them. */
-export function Analysis({ analysis, files, onGains, onVehicle }: Props) {
-  const { file_name, autopilot, release, frame, vehicle, vehicles, tuning, replica, texts, figures } = analysis;
+export function Analysis({ answer, analysis }: Props) {
+  const { file_name, vehicle, vehicles, tuning, replica, texts, figures, log } = answer;
+  const { files } = useSentLog(log.id);
+  const { analyze } = analysis;
+  const fileNeeded = (what: string) => <FileNeeded analysis={analysis} name={file_name} what={what} />;
   const drawn = figures[useComputedColorScheme("light")] ?? {};
   const compared = "signals" in replica;
   const betterGains = compared ? replica.better_gains : null;
@@ -54,10 +46,25 @@ export function Analysis({ analysis, files, onGains, onVehicle }: Props) {
       figures={drawn["tuning"]}
       description={tuning.description && <Flight description={tuning.description} />}
     >
-      {files && tuning.starts_campaign && (
-        <StartCampaign files={files} experiment={tuning.experiment} loggedVehicle={vehicle} />
+      {tuning.starts_campaign &&
+        (log.starts_campaign || files ? (
+          <StartCampaign
+            logId={log.id}
+            files={log.starts_campaign ? null : files}
+            experiment={tuning.experiment}
+            loggedVehicle={vehicle}
+          />
+        ) : (
+          fileNeeded("A campaign from these takeoffs")
+        ))}
+      {texts.tuning.parameter_file && (
+        <Download
+          href={`data:text/plain;charset=utf-8,${encodeURIComponent(texts.tuning.parameter_file.content)}`}
+          name={texts.tuning.parameter_file.name}
+        >
+          Download parameter file
+        </Download>
       )}
-      {texts.tuning.parameter_file && <DownloadButton {...texts.tuning.parameter_file} />}
     </Part>,
     <Part
       key="replica"
@@ -68,23 +75,30 @@ export function Analysis({ analysis, files, onGains, onVehicle }: Props) {
       label="Difference of every signal"
       figures={drawn["replica"]}
     >
-      {files && betterGains && <BetterGains gains={betterGains} onGains={onGains} />}
-      {!compared && replica.reasons.some(({ field }) => field === "gains") && (
-        <GainsAsked name={file_name} onGains={onGains} />
+      {files && betterGains && (
+        <BetterGains gains={betterGains} onGains={(gains) => analyze({ files, vehicle, gains })} />
       )}
+      {!compared &&
+        replica.reasons.some(({ field }) => field === "gains") &&
+        (files ? (
+          <GainsAsked name={file_name} onGains={(gains) => analyze({ files, vehicle, gains })} />
+        ) : (
+          fileNeeded("An analysis with other gains")
+        ))}
     </Part>,
   ];
   return (
-    <article className={page["stack"]} aria-label={`Analysis of ${file_name}`}>
-      <div>
-        <Title order={2} fz="var(--text-page)">
-          {file_name}
-        </Title>
-        <Text c="dimmed">{[autopilot, release, frame].filter(Boolean).join(" · ")}</Text>
-        {vehicle !== null && <LoggedVehicles vehicles={vehicles} analysed={vehicle} onVehicle={onVehicle} />}
-      </div>
+    <>
+      {vehicle !== null && (
+        <VehiclesInLog
+          vehicles={vehicles}
+          analysed={vehicle}
+          onVehicle={files && ((system) => analyze({ files, vehicle: system }))}
+        />
+      )}
+      {vehicle !== null && !files && fileNeeded("An analysis of another vehicle")}
       {tuning.grade === "refused" && compared ? parts.reverse() : parts}
-    </article>
+    </>
   );
 }
 
@@ -126,13 +140,7 @@ function Part({ title, badge, texts, tone, label, figures = [], description, chi
               ))}
             </Group>
           ))}
-        {table && (
-          <DataTable
-            table={{ columns: table.columns.map(plainColumn), rows: table.rows }}
-            label={label}
-            height={ROW_PX * table.rows.length + HEADER_PX}
-          />
-        )}
+        {table && <DataTable table={{ columns: table.columns.map(plainColumn), rows: table.rows }} label={label} />}
         <ul className={page["notes"]}>
           {notes.map((note) => (
             <li key={note}>{note}</li>
@@ -165,21 +173,7 @@ function plainColumn(name: string) {
   return { name, title: name, unit: "", digits: null };
 }
 
-function DownloadButton({ name, content }: { name: string; content: string }) {
-  return (
-    <Button
-      component="a"
-      variant="default"
-      href={`data:text/plain;charset=utf-8,${encodeURIComponent(content)}`}
-      download={name}
-      leftSection={<IconDownload size={18} aria-hidden />}
-    >
-      Download parameter file
-    </Button>
-  );
-}
-
-function BetterGains({ gains, onGains }: { gains: Record<string, number>; onGains: Props["onGains"] }) {
+function BetterGains({ gains, onGains }: { gains: Record<string, number>; onGains: (gains: string) => void }) {
   const named = Object.entries(gains).map(([name, value]) => `${name} ${gainText(value)}`);
   return (
     <Button variant="default" onClick={() => onGains(Object.values(gains).join(","))}>

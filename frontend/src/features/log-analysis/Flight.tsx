@@ -3,6 +3,7 @@ import type { Description } from "../../api/logAnalyses";
 import { percentText, withUnit } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
 import fleet from "../fleet/Fleet.module.css";
+import { lengthText } from "./readings";
 
 /** The whole flight as it was flown; what the log does not tell has no place. */
 export function Flight({ description }: { description: Description }) {
@@ -49,12 +50,12 @@ export function readingsOf(flight: Description): Reading[] {
     })),
     ...known(mean, (value) => ({
       title: "Mean deviation",
-      value: length(value),
-      detail: `at most ${length(largest ?? value)}`,
+      value: lengthText(value),
+      detail: `at most ${lengthText(largest ?? value)}`,
     })),
     ...known(flight.searched_s || null, () => ({
       title: "Oscillation",
-      value: oscillation ? `±${length(oscillation.amplitude_m)}` : "none",
+      value: oscillation ? `±${lengthText(oscillation.amplitude_m)}` : "none",
       ...(oscillation && {
         detail: `${withUnit(oscillation.frequency_hz, "Hz", 2)}, since ${withUnit(oscillation.since_s, "s", 0)}`,
       }),
@@ -69,9 +70,4 @@ export function readingsOf(flight: Description): Reading[] {
 
 function known<T>(value: T | null, reading: (value: T) => Reading): Reading[] {
   return value === null ? [] : [reading(value)];
-}
-
-/** Below 1 m in millimetres. */
-function length(metres: number): string {
-  return metres < 1 ? withUnit(1000 * metres, "mm", metres < 0.01 ? 1 : 0) : withUnit(metres, "m", 2);
 }

@@ -1,93 +1,69 @@
-import { Button, FileButton, Group, Skeleton, Text, Title } from "@mantine/core";
-import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
-import { useRef, useState } from "react";
-import { ANALYSED_FILES, type AnalysedLog, useAnalyzeLog } from "../../api/logAnalyses";
-import { recordOf } from "../../api/records";
+import { Skeleton, Text, Title } from "@mantine/core";
+import { useLoggedVehicles, useLogs } from "../../api/logAnalyses";
+import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
+import { ShowMore } from "../../ui/ShowMore";
 import { useTitle } from "../../ui/useTitle";
-import { Analysis } from "./Analysis";
-import classes from "./LogAnalysis.module.css";
+import { LogDrop, Progress } from "./ChooseLog";
+import { LogTable, VehicleTable } from "./LogTable";
+import { useAnalysis } from "./useAnalysis";
 
-const EXAMPLE = "Example";
-
-/** What one log tells: better altitude gains, and how well the replica of the controller explains it. */
+/** The front door for one log, and the library of those analysed before. */
 export function LogAnalysisPage() {
   useTitle("Log analysis");
-  const [over, setOver] = useState(false);
-  const resetFile = useRef<() => void>(null);
-  const { mutate, data, error, variables, isPending } = useAnalyzeLog();
-  const name = variables?.files?.file.name ?? EXAMPLE;
-  const analyze = (log: AnalysedLog) => !isPending && mutate(log);
-  const choose = (chosen: readonly File[]) => {
-    const files = recordOf(chosen);
-    if (files) analyze({ files });
-    resetFile.current?.();
-  };
+  const analysis = useAnalysis();
   return (
-    // biome-ignore lint/a11y/noStaticElementInteractions: dropping a file is a shortcut for the button below
-    <div
-      className={page["stack"]}
-      onDragOver={(event) => {
-        event.preventDefault();
-        setOver(true);
-      }}
-      onDragLeave={() => setOver(false)}
-      onDrop={(event) => {
-        event.preventDefault();
-        setOver(false);
-        choose([...event.dataTransfer.files]);
-      }}
-    >
+    <div className={page["stack"]}>
       <Title order={1}>Log analysis</Title>
-      {isPending && (
-        <Panel title={name}>
-          <p aria-live="polite">Analysing the log. This takes about 10 seconds.</p>
-          <Skeleton height={280} mt={12} radius="md" aria-hidden />
-        </Panel>
-      )}
-      {data && variables && (
-        <Analysis
-          analysis={data}
-          files={variables.files}
-          onGains={(gains) => analyze({ ...variables, gains })}
-          onVehicle={(vehicle) => analyze({ files: variables.files, vehicle })}
-        />
-      )}
-      <Panel
-        title={data ? "Analyse another log" : "Better altitude gains from one log"}
-        className={over ? classes["over"] : ""}
-      >
+      <Progress analysis={analysis} />
+      <LogDrop analysis={analysis} title="Better altitude gains from one log">
         <Text maw="90ch" lh={1.45} mb={10}>
           Drop or choose a log. ArduCopter's .bin or PX4's .ulg: a flight in a mode that holds altitude, with climbs and
           descents of about 2 m and 5 s of hover in between; or a .tlog of it in GUIDED or Offboard. Paparazzi: .data
-          and .log, or .tlog, of takeoffs to 3 m. Any other flight of a copter is described. Nothing is stored.
+          and .log, or .tlog, of takeoffs to 3 m. Any other flight of a copter is described.
         </Text>
-        <Text maw="90ch" lh={1.45} mb={10}>
+        <Text maw="90ch" lh={1.45}>
           Every signal of the controller that the log contains is also compared with Gainline's replica of that
           controller. For this alone a trace with a row for every step of the loop will do, .csv or .csv.gz.
         </Text>
-        <Group gap={10} mt={12} mb={10}>
-          <FileButton multiple accept={ANALYSED_FILES} onChange={choose} resetRef={resetFile}>
-            {(props) => (
-              <Button {...props} loading={isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
-                Choose log
-              </Button>
-            )}
-          </FileButton>
-          <Button
-            variant="default"
-            disabled={isPending}
-            leftSection={<IconPlayerPlay size={18} aria-hidden />}
-            onClick={() => analyze({ files: null })}
-          >
-            Analyse example
-          </Button>
-        </Group>
-        {error !== null && <Text fw={650}>{name}</Text>}
-        <ErrorNotice error={error} />
-      </Panel>
+      </LogDrop>
+      <Vehicles />
+      <Logs kept title="Kept logs" none="No log is kept yet. Analyse one, and keep it as a flight of its vehicle." />
+      <Logs kept={false} title="Not kept, deleted seven days after their analysis" />
     </div>
+  );
+}
+
+function Vehicles() {
+  const { data = [], error } = useLoggedVehicles();
+  if (data.length === 0 && error === null) return null;
+  return (
+    <Panel title="Vehicles with kept logs">
+      <ErrorNotice error={error} />
+      <VehicleTable vehicles={data} />
+    </Panel>
+  );
+}
+
+interface LogsProps {
+  kept: boolean;
+  title: string;
+  /** In place of the list if it is empty, which then has no place without it. */
+  none?: string;
+}
+
+function Logs({ kept, title, none }: LogsProps) {
+  const logs = useLogs(kept);
+  if (logs.data?.total === 0 && none === undefined) return null;
+  return (
+    <Panel title={title}>
+      <ErrorNotice error={logs.error} />
+      {logs.isPending && <Skeleton height={120} aria-busy="true" />}
+      {logs.data?.total === 0 && <Note>{none}</Note>}
+      {logs.data && logs.data.total > 0 && <LogTable label={title} logs={logs.data.items} />}
+      <ShowMore list={logs} mt={12} />
+    </Panel>
   );
 }

@@ -8,14 +8,16 @@ import { SelectField } from "../../ui/Fields";
 import { ErrorNotice } from "../../ui/Notices";
 
 interface Props {
-  files: RecordFiles;
+  logId: number;
+  /** Null: what is stored of the log suffices. */
+  files: RecordFiles | null;
   experiment: string | null;
   /** System id of the one analysed, if the log has several. */
   loggedVehicle: number | null;
 }
 
 /** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
-export function StartCampaign({ files, experiment, loggedVehicle }: Props) {
+export function StartCampaign({ logId, files, experiment, loggedVehicle }: Props) {
   const { mutate, error, isPending } = useStartCampaign();
   const [chosen, setChosen] = useState("");
   const flying = (useVehicles().data ?? []).filter(
@@ -40,7 +42,7 @@ export function StartCampaign({ files, experiment, loggedVehicle }: Props) {
         disabled={isOpen}
         onClick={() =>
           mutate(
-            { files, vehicle: chosen === "" ? null : Number(chosen), loggedVehicle },
+            { logId, files, vehicle: chosen === "" ? null : Number(chosen), loggedVehicle },
             { onSuccess: ({ id }) => navigate(`/campaigns/${id}`) },
           )
         }

@@ -2,7 +2,7 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { expect, test, vi } from "vitest";
-import { LoggedVehicles } from "./LoggedVehicles";
+import { VehiclesInLog } from "./VehiclesInLog";
 
 test("all vehicles of a log are listed in order of their ids, and another one can be chosen", async () => {
   vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
@@ -11,7 +11,7 @@ test("all vehicles of a log are listed in order of their ids, and another one ca
   await act(() =>
     createRoot(page).render(
       <MantineProvider defaultColorScheme="light">
-        <LoggedVehicles vehicles={{ 31: "Paparazzi", 2: "ArduCopter" }} analysed={31} onVehicle={onVehicle} />
+        <VehiclesInLog vehicles={{ 31: "Paparazzi", 2: "ArduCopter" }} analysed={31} onVehicle={onVehicle} />
       </MantineProvider>,
     ),
   );
