@@ -17,8 +17,8 @@ import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { bad, good, quiet, type StateLabel } from "../../ui/states";
-import { confidenceText } from "../../ui/uncertainty";
-import { changeText, factorText, parameterGroups, parameterText, QUANTITIES, quantityText } from "./readings";
+import { confidenceText, plusMinus } from "../../ui/uncertainty";
+import { changeText, parameterGroups, parameterText, QUANTITIES, quantityText } from "./readings";
 
 const SAME = "same gains";
 
@@ -78,18 +78,15 @@ const VALUES: readonly Column<ParameterChange>[] = [
 function Compared({ logId, before }: { logId: number; before: number }) {
   const { data, error } = useLogComparison(logId, before);
   if (!data) return error ? <ErrorNotice error={error} /> : <Skeleton height={240} aria-busy="true" />;
-  const { verdict, confidence, effect, sentence, notes, parameters } = data;
+  const { verdict, confidence, change, sentence, notes, parameters } = data;
   return (
     <Stack gap={14}>
       <Aside tone={toneOf(verdict)} role="status">
         <Group gap="4px 14px">
           <StateBadge words={VERDICTS[verdict ?? SAME]} />
-          {effect && (
+          {change.by_gains_m !== null && (
             <Text fw={650}>
-              Error {factorText(effect.factor)}{" "}
-              <Text span inherit c="dimmed" fw={400}>
-                ({factorText(effect.low)} … {factorText(effect.high)}, 90 % interval)
-              </Text>
+              {plusMinus(1000 * change.by_gains_m, 1000 * (change.standard_error_m ?? 0), "mm")} by the gains
             </Text>
           )}
           {confidence !== null && <Note>{confidenceText(confidence)} confidence</Note>}
