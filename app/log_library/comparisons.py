@@ -1,6 +1,7 @@
 """Comparison of two logs of one vehicle: which parameters differ, and what the change of the gains does."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 from sqlalchemy.orm import Session
 
@@ -56,12 +57,19 @@ def compare(session: Session, log_id: int, before_id: int | None) -> LogComparis
 
 def _gain_change(rows: Sequence[AnalysedLogRow], stored: Sequence[StoredAnswer]) -> GainChange:
     takeoffs = [each.takeoffs for each in stored]
-    return compare_takeoffs(*takeoffs) if all(takeoffs) else compare_logs(*(_flown(each) for each in rows))
+    if all(takeoffs):
+        return compare_takeoffs(*takeoffs)
+    return _compare_flights(*((log_view(each).numbers.deviation_m, each.flight) for each in rows))
 
 
-def _flown(row: AnalysedLogRow) -> FlownLog:
-    error_m = log_view(row).numbers.deviation_m
-    if row.flight is None:
+@lru_cache(maxsize=64)  # what visitors look at again takes no time
+def _compare_flights(*logs: tuple[float | None, bytes | None]) -> GainChange:
+    """Compare two logs by their errors and packed flights."""
+    return compare_logs(*(_flown(*each) for each in logs))
+
+
+def _flown(error_m: float | None, packed: bytes | None) -> FlownLog:
+    if packed is None:
         return FlownLog(error_m=error_m)
-    unpacked = unpack_flight(row.flight)
+    unpacked = unpack_flight(packed)
     return FlownLog(error_m=error_m, flight=unpacked.flight, copters=unpacked.copters)

@@ -23,9 +23,9 @@ from app.common.settings import is_loopback
 from app.web.errors import problem_response
 
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
-_COSTLY: Final = ("/api/system/backup", "/report.pdf", "/bundle")
-"""Suffixes of paths whose reading computes for long or fills a disk, possibly during a flight; these need the
-permission to change."""
+_GUARDED: Final = ("/api/system/backup", "/report.pdf", "/bundle", "/file")
+"""Suffixes of paths whose reading computes for long or fills a disk, possibly during a flight, or gives away a log with
+the places where it was flown; these need the permission to change."""
 _FORWARDED: Final = frozenset({"forwarded", "via", "x-real-ip", "x-client-ip", "true-client-ip", "cdn-loop"})
 _FORWARDED_BEGINS: Final = (
     *("x-forwarded", "x-original-", "x-proxy", "x-remote-", "x-cluster-", "x-tunnel", "proxy-client-"),
@@ -69,7 +69,7 @@ def _require_admitted(request: Request) -> None:
             "The request came from a page of another site and was rejected.",
             hint="Use the dashboard, or send the request from a program without the header Origin.",
         )
-    if changes or path.endswith(_COSTLY):
+    if changes or path.endswith(_GUARDED):
         require(Permission.CHANGE, caller_of(request))
 
 
