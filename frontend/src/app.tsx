@@ -9,6 +9,7 @@ import type * as PageModule from "./pages";
 import { NotFoundPage } from "./ui/NotFound";
 
 const ComparePage = lazyPage("ComparePage");
+const FailureShapesPage = lazyPage("FailureShapesPage");
 const LogAnalysisPage = lazyPage("LogAnalysisPage");
 const LogPage = lazyPage("LogPage");
 const LoggedVehiclePage = lazyPage("LoggedVehiclePage");
@@ -42,6 +43,7 @@ export function App() {
         <Route path="/log-analysis" component={LogAnalysisPage} />
         <Route path="/log-analysis/:logId" component={LogPage} />
         <Route path="/log-analysis/vehicles/:vehicleId" component={LoggedVehiclePage} />
+        <Route path="/failure-shapes" component={FailureShapesPage} />
         <Route path="/jobs" component={JobsPage} />
         <Route path="/settings" component={SettingsPage} />
         <Route path="/controller/*?">

@@ -9,6 +9,7 @@ export { VehiclesPage } from "./features/fleet/VehiclesPage";
 export { FlyPage } from "./features/fly/FlyPage";
 export { JobsPage } from "./features/jobs/JobsPage";
 export { ReproductionsPage } from "./features/jobs/ReproductionsPage";
+export { FailureShapesPage } from "./features/log-analysis/FailureShapesPage";
 export { LogAnalysisPage } from "./features/log-analysis/LogAnalysisPage";
 export { LoggedVehiclePage } from "./features/log-analysis/LoggedVehiclePage";
 export { LogPage } from "./features/log-analysis/LogPage";

@@ -12,6 +12,7 @@ import {
   getTrend,
   keepLog,
   type LogPlace,
+  listFailureShapes,
   listLoggedVehicles,
   listLogs,
   renameLoggedVehicle,
@@ -111,6 +112,10 @@ export const useLoggedVehicles = () => useRead([LOGS, "vehicles"], () => answer(
 
 export const useLoggedVehicle = (vehicleId: number) =>
   useRead([LOGS, "vehicle", vehicleId], () => answer(getLoggedVehicle({ path: { vehicle_id: vehicleId } })));
+
+/** The atlas of failure shapes, which a new version alone changes. */
+export const useFailureShapes = () =>
+  useQuery({ queryKey: ["failure-shapes"], queryFn: () => answer(listFailureShapes()) });
 
 export function useTrend(vehicleId: number) {
   return useFigure(

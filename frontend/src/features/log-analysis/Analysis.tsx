@@ -1,8 +1,10 @@
-import { Button, Group, SimpleGrid, Text, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Button, Group, SimpleGrid, Text, useComputedColorScheme } from "@mantine/core";
 import type { ReactNode } from "react";
+import { Link } from "wouter";
 import { type LogAnalysis, type PartTexts, useSentLog } from "../../api/logAnalyses";
 import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import { DataTable } from "../../ui/DataTable";
 import { gainText } from "../../ui/format";
@@ -117,7 +119,7 @@ interface PartProps {
 
 /** One part of the analysis: its answer in a sentence, reasons, flight, facts, table, notes and figures. */
 function Part({ title, badge, texts, tone, label, figures = [], description, children }: PartProps) {
-  const { answer, reasons, facts, table, notes } = texts;
+  const { answer, reasons, facts, shapes = [], table, notes } = texts;
   return (
     <>
       <Panel title={title} tools={<StateBadge words={badge} />}>
@@ -130,6 +132,16 @@ function Part({ title, badge, texts, tone, label, figures = [], description, chi
           </Text>
         ))}
         {description}
+        {shapes.map(({ title: name, found, advice }) => (
+          <Aside key={name} tone="warn" my={8} maw="90ch">
+            <Anchor component={Link} to="/failure-shapes" fw={650}>
+              {name}
+            </Anchor>
+            <p>
+              {found} {advice}
+            </p>
+          </Aside>
+        ))}
         {facts
           .filter(({ title: name }) => !description || name !== "Whole flight")
           .map(({ title: name, values }) => (

@@ -107,7 +107,7 @@ function Compared({ logId, before }: { logId: number; before: number }) {
       />
       {parameters.length === 0 && <Note>No parameter differs.</Note>}
       {parameterGroups(parameters).map(({ group, title, parameters: changed }) => (
-        <details key={group} open={group !== "self-written"}>
+        <details key={group} open={group === "gain" || group === "loop"}>
           <summary>
             {title}: {changed.length} changed
           </summary>

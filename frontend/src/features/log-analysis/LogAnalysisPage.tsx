@@ -1,4 +1,5 @@
-import { Skeleton, Text, Title } from "@mantine/core";
+import { Anchor, Skeleton, Text, Title } from "@mantine/core";
+import { Link } from "wouter";
 import { useLoggedVehicles, useLogs } from "../../api/logAnalyses";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
@@ -26,7 +27,12 @@ export function LogAnalysisPage() {
         </Text>
         <Text maw="90ch" lh={1.45}>
           Every signal of the controller that the log contains is also compared with Gainline's replica of that
-          controller. For this alone a trace with a row for every step of the loop will do, .csv or .csv.gz.
+          controller. For this alone a trace with a row for every step of the loop will do, .csv or .csv.gz. Every
+          flight is searched for{" "}
+          <Anchor component={Link} to="/failure-shapes" inherit underline="always">
+            shapes of failure
+          </Anchor>
+          .
         </Text>
       </LogDrop>
       <Vehicles />
