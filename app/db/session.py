@@ -7,7 +7,8 @@ another connection wrote in between; one that takes the write lock first waits f
 
 import sqlite3
 import threading
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
@@ -151,43 +152,14 @@ def translated(database_file: Path) -> Iterator[None]:
         yield
     except (exc.DBAPIError, sqlite3.Error) as error:
         message = str(error.orig if isinstance(error, exc.DBAPIError) else error).lower()
-        for reason, (happened, hint) in _TROUBLES.items():
+        for reason, texts in _TROUBLES.items():
             if reason in message:
-                raise StorageError(happened.format(file=database_file), hint=hint.format(file=database_file)) from error
+                happened, hint = (texts[part].format(file=database_file) for part in ("happened", "hint"))
+                raise StorageError(happened, hint=hint) from error
         raise
 
 
-_DAMAGED: Final = (
-    "The database {file} is damaged.",
-    "Stop Gainline and restore the last backup; keep the damaged file, because most of it can be recovered.",
+_TROUBLES: Final[Mapping[str, Mapping[str, str]]] = tomllib.loads(
+    (Path(__file__).parent / "troubles.toml").read_text("utf-8")
 )
-_TROUBLES: Final = {
-    "is full": (
-        "The disk that holds {file} is full; nothing from this request was stored.",
-        "Free some disk space there, then try again. Everything stored before is intact.",
-    ),
-    "disk i/o error": (
-        "The disk that holds {file} could not be written or read; nothing from this request was stored.",
-        "Check its free space and its health, then try again.",
-    ),
-    "is locked": (
-        "The database was busy for longer than five seconds; nothing from this request was stored.",
-        "Try again. If it happens often, check for another program that has {file} open.",
-    ),
-    "readonly database": (
-        "This user has no permission to write the database {file}; nothing from this request was stored.",
-        "Give this user write permission for the file and its folder, then try again.",
-    ),
-    "unable to open": (
-        "The database {file} cannot be opened.",
-        "Check that its folder exists and that this user can write there.",
-    ),
-    "malformed": _DAMAGED,
-    "no such table": _DAMAGED,
-    "unsupported file format": _DAMAGED,
-    "could not decode": _DAMAGED,
-    "not a database": (
-        "The file {file} is not a Gainline database.",
-        "Choose another data folder (GAINLINE_DATA_DIR), or move this file away.",
-    ),
-}
+"""What they mean and what to do, by a part of their messages."""

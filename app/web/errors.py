@@ -4,10 +4,12 @@ of both in the OpenAPI document. The only module that maps errors to status code
 
 import errno
 import json
+import tomllib
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any, Final, get_args
 
 import structlog
@@ -173,32 +175,7 @@ def _refused(found: Mapping[str, Any], schema: object) -> Problem:
 _SHOWN: Final = 40
 """Longest text of a refused value that is repeated."""
 
-_REASONS: Final[Mapping[str, str]] = {
-    "missing": "is missing",
-    "extra_forbidden": "is not a known field",
-    "greater_than_equal": "must be at least {ge}",
-    "greater_than": "must be above {gt}",
-    "less_than_equal": "must be at most {le}",
-    "less_than": "must be below {lt}",
-    "string_too_short": "must have at least {min_length} characters",
-    "string_too_long": "must have at most {max_length} characters",
-    "literal_error": "must be {expected}",
-    "enum": "must be {expected}",
-    "int_type": "must be a whole number",
-    "int_from_float": "must be a whole number",
-    "int_parsing": "must be a whole number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "finite_number": "must be a finite number",
-    "bool_type": "must be true or false",
-    "bool_parsing": "must be true or false",
-    "string_type": "must be text",
-    "dict_type": "must be an object",
-    "model_type": "must be an object with fields",
-    "model_attributes_type": "must be an object with fields",
-    "list_type": "must be a list",
-    "tuple_type": "must be a list",
-}
+_REASONS: Final[Mapping[str, str]] = tomllib.loads((Path(__file__).parent / "refusals.toml").read_text("utf-8"))
 """By the validator's type of error, with its limits."""
 
 _ABOUT_FIELDS: Final = frozenset({"extra_forbidden", "model_type", "model_attributes_type"})

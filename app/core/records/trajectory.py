@@ -4,8 +4,10 @@ Records keep their peaks and shape (MinMaxLTTB, Van Der Donckt et al., 2023); sm
 they bend (Ramer, 1972; Douglas and Peucker, 1973).
 """
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -14,33 +16,10 @@ from numpy.typing import NDArray
 
 Samples = NDArray[np.float64]
 
-CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "altitude_m": "m",
-        "altitude_2_m": "m",
-        "altitude_m_lower": "m",
-        "altitude_m_upper": "m",
-        "climb_rate_m_s": "m/s",
-        "set_point_m": "m",
-        "reference_m": "m",
-        "thrust": "1",
-        "throttle": "1",
-        "feed_forward": "1",
-        "feedback": "1",
-        "battery_v": "V",
-        "pitch_error_rad": "rad",
-        "pitch_error_rad_lower": "rad",
-        "pitch_error_rad_upper": "rad",
-        "pitch_reference_rad": "rad",
-        "pitch_rad": "rad",
-        "pitch_rate_rad_s": "rad/s",
-        "angle_of_attack_rad": "rad",
-        "altitude_change_m": "m",
-        "speed_change_m_s": "m/s",
-        "thrust_change_n": "N",
-        "elevator_rad": "rad",
-    }
-)
+with (Path(__file__).parent / "channels.csv").open(encoding="ascii", newline="") as _rows:
+    CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
+        {row["channel"]: row["unit"] for row in csv.DictReader(_rows)}
+    )
 """Known channels and their units.
 
 Thrust and its two parts are shares of full command (the autopilot's 9600 counts), recorded with every sample. Throttle
