@@ -21,7 +21,6 @@ from app.core.definition import Definition, Flight, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.policy import PolicySpace
 from app.core.tuning.evidence import Evidence
 
 AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType(
@@ -114,8 +113,3 @@ def evidence_of(
         donor=donor,
         open_until_flight=open_until_flight,
     )
-
-
-def space_of(definition: Definition) -> PolicySpace:
-    """The policy space of a campaign, within its bounds."""
-    return experiment_of(definition).space.narrowed(definition.bounds)

@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.autopilots.registry import experiment_of, space_of
+from app.autopilots.registry import experiment_of
 from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
@@ -41,9 +41,10 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName) -> tupl
     campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     definition = definition_of(campaign)
-    if not isinstance(experiment_of(definition), ModelledExperiment):
+    experiment = experiment_of(definition)
+    if not isinstance(experiment, ModelledExperiment):
         return _waiting("There is no model of this vehicle's controller, so no landscape can be computed.")
-    if free_gains(space_of(definition)) < 2:
+    if free_gains(experiment.space.narrowed(definition.bounds)) < 2:
         return _waiting("The campaign's bounds leave fewer than two gains free; a landscape needs two.")
     if proposal is None:
         return _waiting("The landscape appears here once the first gains are proposed.")
