@@ -239,7 +239,7 @@ def test_a_campaign_starts_from_a_stored_log_once_a_vehicle_can_fly_it(dashboard
     options = {"address": "udp:127.0.0.1:14997@14996", "autopilot": "ardupilot", "simulated": True}
     states.vehicle("Bee", options=options)
     dashboard.button("Start campaign").click()
-    expect(dashboard.page.get_by_role("heading", level=1)).to_have_text("arducopter_steps")
+    expect(dashboard.page.get_by_role("heading", level=1)).to_have_text("altitude_steps")
 
 
 def test_a_vehicle_is_recognised_by_its_hardware_id_whatever_its_name_is_by_then(
