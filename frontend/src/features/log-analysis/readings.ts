@@ -17,7 +17,7 @@ export function lengthText(metres: number): string {
   return metres < 1 ? withUnit(1000 * metres, "mm", metres < 0.01 ? 1 : 0) : withUnit(metres, "m", 2);
 }
 
-/** The ends of the range in which a margin is searched. */
+/** The range in which a margin is searched; a flight's is told by its ends beyond them. */
 const MARGINS = { least: 1, most: 8 };
 
 function marginText(margin: number): string {
@@ -32,8 +32,6 @@ interface Quantity {
   title: string;
   value: (numbers: LogNumbers) => number | null | undefined;
   text: (value: number, numbers: LogNumbers) => string;
-  /** Whether its change from one log to the next is shown. */
-  hasChange?: (value: number) => boolean;
 }
 
 export const QUANTITIES: readonly Quantity[] = [
@@ -48,12 +46,7 @@ export const QUANTITIES: readonly Quantity[] = [
     value: ({ activity }) => activity,
     text: (share) => percentText(100 * share, share < 0.01 ? 2 : 1),
   },
-  {
-    title: "Margin",
-    value: ({ margin }) => margin,
-    text: marginText,
-    hasChange: (margin) => MARGINS.least <= margin && margin < MARGINS.most,
-  },
+  { title: "Margin", value: ({ margin }) => margin, text: marginText },
 ];
 
 export function quantityText({ value, text }: Quantity, numbers: LogNumbers): string {
@@ -69,12 +62,12 @@ export function factorText(factor: number): string {
   return percent > 0 ? `+${text}` : text;
 }
 
-/** The change from the log before to this one. */
-export function changeText({ value, hasChange = () => true }: Quantity, before: LogNumbers, now: LogNumbers): string {
+/** The change from another log to this one; none of a margin beyond the range that is searched. */
+export function changeText({ value, text }: Quantity, before: LogNumbers, now: LogNumbers): string {
   const [from, to] = [value(before), value(now)];
   const percent = percentChange(to, from);
-  const isShown = [from, to].every((one) => typeof one === "number" && hasChange(one));
-  return percent === null || !isShown ? NOTHING : factorText(1 + percent / 100);
+  const isBeyond = text === marginText && [from, to].some((one) => one === 0 || one === MARGINS.most);
+  return percent === null || isBeyond ? NOTHING : factorText(1 + percent / 100);
 }
 
 /** A parameter as single precision holds it. */
