@@ -3,7 +3,7 @@
 import gc
 import os
 
-__version__ = "0.7.0.dev0"
+__version__ = "0.7.0"
 
 # Before numpy is loaded. Its matrices are small here: with threads they take several times as long, and their last bits
 # depend on the number of processors.

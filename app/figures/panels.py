@@ -46,7 +46,8 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
-    """Panels with a common abscissa. `summary` describes them in a sentence."""
+    """Panels with a common abscissa, whose ticks are `x_step` apart if it is not None. `summary` describes them in a
+    sentence."""
 
     title: str
     summary: str
@@ -54,6 +55,7 @@ class Plot:
     panels: tuple[Panel, ...]
     x_range: tuple[float, float] | None = None
     x_digits: int = 1
+    x_step: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +118,7 @@ class PanelsFigure(Figure):
 
     def _axes(self, number: int, panel: Panel) -> dict[str, object]:
         count = len(self.plot.panels)
-        x = {} if self.plot.x_range is None else {"range": list(self.plot.x_range)}
+        x = {"dtick": self.plot.x_step} | ({} if self.plot.x_range is None else {"range": list(self.plot.x_range)})
         y = {} if panel.y_range is None else {"range": list(panel.y_range)}
         return self.palette.panel_axes(
             (number, count, GAP),

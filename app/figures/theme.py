@@ -1,8 +1,12 @@
 """Chart style of all figures: colour roles for both themes, fonts, axes, margins."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Literal
+
+from pydantic import TypeAdapter
 
 ThemeName = Literal["light", "dark"]
 MOST_TICKS: Final = 12
@@ -136,30 +140,9 @@ class Palette:
         return label(text, self.dim, **edge | more)
 
 
-PALETTES: Final[Mapping[ThemeName, Palette]] = {
-    "light": Palette(
-        surface="#ffffff",
-        ink="#18202b",
-        dim="#545f6e",
-        grid="#e4e8ed",
-        best="#0a7a6c",
-        earlier="#8590a0",
-        prediction="#6d3fc0",
-        bad="#c0271f",
-        gains=("#0a7a6c", "#a85a00", "#2f5fc4"),
-    ),
-    "dark": Palette(
-        surface="#181d24",
-        ink="#eef2f6",
-        dim="#a9b4c1",
-        grid="#2d343e",
-        best="#3fd0bb",
-        earlier="#75818f",
-        prediction="#bfa3ff",
-        bad="#ff8a80",
-        gains=("#3fd0bb", "#ffb454", "#8fb3ff"),
-    ),
-}
+PALETTES: Final = TypeAdapter(Mapping[ThemeName, Palette]).validate_python(
+    tomllib.loads((Path(__file__).parent / "palettes.toml").read_text("utf-8"))
+)
 
 
 def with_opacity(colour: str, opacity: float) -> str:

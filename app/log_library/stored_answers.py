@@ -39,15 +39,11 @@ def _lines(plot: Plot) -> list[Line]:
 
 def _thinned(plot: Plot, points: int) -> Plot:
     """The plot with every other point of the lines with more than so many."""
-    panels = [
-        replace(
-            panel,
-            lines=tuple(
-                replace(line, x=line.x[::2], y=line.y[::2]) if len(line.x) > points else line for line in panel.lines
-            ),
-        )
-        for panel in plot.panels
-    ]
+
+    def shorter(line: Line) -> Line:
+        return replace(line, x=line.x[::2], y=line.y[::2]) if len(line.x) > points else line
+
+    panels = (replace(panel, lines=tuple(map(shorter, panel.lines))) for panel in plot.panels)
     return replace(plot, panels=tuple(panels))
 
 

@@ -226,7 +226,6 @@ def _known(session: Session, row: AnalysedLogRow) -> LoggedVehicleRow | None:
     return repository.vehicle_of_hardware_or_none(session, row.hardware_id) if row.hardware_id else None
 
 
-def _forget_without_logs(session: Session, *vehicles: LoggedVehicleRow | None) -> None:
-    for each in vehicles:
-        if each is not None and not repository.logs_of(session, each.id):
-            session.delete(each)
+def _forget_without_logs(session: Session, vehicle: LoggedVehicleRow | None) -> None:
+    if vehicle is not None and not repository.logs_of(session, vehicle.id):
+        session.delete(vehicle)

@@ -74,7 +74,8 @@ def notes_of(change: GainChange) -> list[str]:
     further = change.comparison and change.comparison.further
     notes = [] if change.measured_m is None else [f"Measured: {1e3 * change.measured_m:+.1f} mm{attributed}."]
     notes += [f"{count(further.total, 'further flight')} would decide, if the difference stays."] if further else []
-    return [*notes, _CONTRADICTED] if change.is_contradicted else notes
+    notes += [_CONTRADICTED] if change.is_contradicted else []
+    return [each.replace("-", "−") for each in notes]
 
 
 def _value(parameter: float | None) -> str:

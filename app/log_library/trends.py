@@ -64,6 +64,8 @@ def trend_plot(name: str, logs: Sequence[LogNumbers]) -> Plot:
         title=f"Trend of {name}",
         summary=f"Hover throttle, mean deviation, throttle activity and margin in {count(len(logs), 'log')}.",
         x_title="Log",
+        x_range=(0.5, len(logs) + 0.5),
         x_digits=0,
+        x_step=1 + len(logs) // 12,
         panels=tuple(panels),
     )

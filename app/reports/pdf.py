@@ -17,21 +17,7 @@ from app.common.errors import UnavailableError
 PRINTERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 TIMEOUT_S: Final = 60.0
 MAX_CONCURRENT: Final = 2
-_FLAGS: Final = (
-    "--headless",
-    "--disable-gpu",
-    "--disable-extensions",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-dev-shm-usage",
-    "--no-first-run",
-    "--no-pdf-header-footer",
-    "--generate-pdf-document-outline",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
-    "--proxy-server=http://127.0.0.1:9",
-    "--virtual-time-budget=20000",
-)
+_FLAGS: Final = (Path(__file__).parent / "chromium_flags.txt").read_text("ascii").splitlines()
 _places = threading.BoundedSemaphore(MAX_CONCURRENT)
 _log = structlog.get_logger(__name__)
 

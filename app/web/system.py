@@ -4,6 +4,7 @@ that unlocks a browser: it works once and sets a cookie.
 
 import shutil
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -103,23 +104,9 @@ _UNLOCK_HEADERS: Final = {"Cache-Control": "no-store", "Referrer-Policy": "no-re
 _UNLOCKED: Final = "/?unlocked"
 """The first page, which confirms it."""
 
-_SPENT: Final = f"""<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width">
-<title>Gainline: this link has been used</title>
-<style>
-:root {{ color-scheme: light dark; font: 18px/1.5 system-ui, sans-serif }}
-main {{ max-width: 34rem; margin: 15vh auto; padding: 0 1.5rem }}
-</style>
-<main>
-<h1>This link has been used or has expired</h1>
-<p>A link unlocks one browser, within {LINK_VALID_S // 60} minutes. Run <code>gainline unlock</code> on the computer
-that runs Gainline, and open the link that it prints.</p>
-<p><a href="/">Open the dashboard</a>; it cannot command real vehicles from this browser.</p>
-</main>
-</html>
-"""
+_SPENT: Final = (
+    (Path(__file__).parent / "spent_link.html").read_text("utf-8").replace("MINUTES", f"{LINK_VALID_S // 60}")
+)
 
 
 class Access(Schema):
@@ -158,7 +145,7 @@ def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") 
     if not keyring.open_link(token):
         if caller.key >= given:  # the link was opened twice in the same browser
             return RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)
-        return HTMLResponse(_SPENT, 403, headers=_UNLOCK_HEADERS)
+        return HTMLResponse(_SPENT.replace("{minutes}", f"{LINK_VALID_S // 60}"), 403, headers=_UNLOCK_HEADERS)
     answer = RedirectResponse(_UNLOCKED, 303, headers=_UNLOCK_HEADERS)
     answer.set_cookie(keyring.cookie, keyring.value(given), max_age=90 * 24 * 3600, httponly=True, samesite="strict")
     return answer

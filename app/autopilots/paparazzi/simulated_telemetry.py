@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -14,24 +15,10 @@ from app.autopilots.simulated.body import (
     timed,
     whole_ticks,
 )
-from app.autopilots.simulated.copter_parameters import Parameters
+from app.autopilots.simulated.copter_parameters import Parameters, read_periods
 from app.core.control.vertical_guidance import POSITION_BITS, SPEED_BITS, fix
 
-PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(
-    {
-        "LOCAL_POSITION_NED": 0.02,
-        "HEARTBEAT": 0.5,
-        "ATTITUDE": 0.5,
-        "GLOBAL_POSITION_INT": 0.9,
-        "SYS_STATUS": 1.2,
-        "VFR_HUD": 1.3,
-        "ATTITUDE_QUATERNION": 1.5,
-        "SYSTEM_TIME": 2.0,
-        "BATTERY_STATUS": 4.0,
-        "GPS_GLOBAL_ORIGIN": 5.1,
-        "AUTOPILOT_VERSION": 11.1,
-    }
-)
+PERIODS_S: Final = read_periods(Path(__file__).parent / "simulated_periods.csv")
 """Periods with a telemetry file for tuning."""
 
 BARE_POSITION_PERIOD_S: Final = 0.8

@@ -8,7 +8,6 @@ import contextlib
 import math
 import struct
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar, Final
 
 from app.autopilots.dialects import COMMON
@@ -24,6 +23,7 @@ from app.autopilots.simulated.copter_parameters import (
     FlightMode,
     Reaction,
     read_parameters,
+    read_periods,
     real,
 )
 from app.autopilots.simulated.copter_telemetry import HOME_AMSL_M
@@ -74,21 +74,7 @@ class Px4(Copter):
             *read_parameters(Path(__file__).parent / "simulated_parameters.csv"),
         ),
         is_bytewise=True,
-        periods_s=MappingProxyType(
-            {
-                "HEARTBEAT": 1.0,
-                "LOCAL_POSITION_NED": 0.02,
-                "GLOBAL_POSITION_INT": 0.02,
-                "ATTITUDE": 0.02,
-                "VFR_HUD": 0.05,
-                "SYS_STATUS": 0.2,
-                "GPS_RAW_INT": 0.2,
-                "EXTENDED_SYS_STATE": 0.2,
-                "BATTERY_STATUS": 0.5,
-                "SYSTEM_TIME": 1.0,
-                "HOME_POSITION": 2.0,
-            }
-        ),
+        periods_s=read_periods(Path(__file__).parent / "simulated_periods.csv"),
         streams=(),
         modes=(
             FlightMode("POSCTL", custom_mode(3), _MANUAL),

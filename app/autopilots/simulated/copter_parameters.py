@@ -41,6 +41,12 @@ def read_parameters(file: Path) -> tuple[Parameter, ...]:
         return tuple(Parameter(row["name"], Kind[row["kind"]], float(row["default"])) for row in csv.DictReader(rows))
 
 
+def read_periods(file: Path) -> Mapping[str, float]:
+    """Read the periods of messages, s, from a table with the columns `message` and `period_s`."""
+    with file.open(encoding="ascii", newline="") as rows:
+        return {row["message"]: float(row["period_s"]) for row in csv.DictReader(rows)}
+
+
 class Parameters:
     """Parameter values by name, the first of that name, and by place."""
 
