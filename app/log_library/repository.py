@@ -88,8 +88,10 @@ def vehicles(session: Session) -> Sequence[tuple[LoggedVehicleRow, int, Analysed
     return [(vehicle, count, newest) for vehicle, count, newest in session.execute(wanted).all()]
 
 
-def file_of_or_none(session: Session, log_id: int) -> LogFileRow | None:
-    return session.get(LogFileRow, log_id)
+def get_file(session: Session, log_id: int) -> LogFileRow:
+    """The stored file of a log with its companion. Raises NotFoundError."""
+    get_log(session, log_id)
+    return existing(session, LogFileRow, log_id, "file of log")
 
 
 def stored_bytes(session: Session) -> int:

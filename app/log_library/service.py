@@ -22,7 +22,7 @@ from app.core.tuning.logged_takeoffs import comparable_takeoffs
 from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
-from app.log_library import stored_logs
+from app.log_library import repository, stored_logs
 from app.log_library.library_schemas import LogAnalysis
 from app.log_library.takeoffs import logged_takeoffs
 from app.processes.calls import FILE, run_limited
@@ -93,7 +93,7 @@ def start_of(session: Session, log_id: int) -> tuple[Sequence[Takeoff] | Definit
     name, vehicle = stored.answer.file_name, stored.answer.vehicle
     if stored.definition is not None:
         return stored.definition, name
-    file = stored_logs.get_file(session, log_id)
+    file = repository.get_file(session, log_id)
     return read_upload(file.content, file.companion, name=name, vehicle=vehicle), name
 
 

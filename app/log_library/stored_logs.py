@@ -183,17 +183,9 @@ def store_file(session: Session, log_id: int, content: bytes, companion: bytes |
     return _place(session, row, stored)
 
 
-def get_file(session: Session, log_id: int) -> LogFileRow:
-    """A stored file with its companion. Raises NotFoundError."""
-    repository.get_log(session, log_id)
-    if (stored := repository.file_of_or_none(session, log_id)) is None:
-        raise NotFoundError("file of log", log_id)
-    return stored
-
-
 def file_content(session: Session, log_id: int, *, companion: bool) -> tuple[str, bytes]:
     """Name and content of a stored file, or of the .log file beside it. Raises NotFoundError."""
-    stored, name = get_file(session, log_id), repository.get_log(session, log_id).file_name
+    stored, name = repository.get_file(session, log_id), repository.get_log(session, log_id).file_name
     if not companion:
         return name, stored.content
     if stored.companion is None:
