@@ -27,7 +27,8 @@ from app.db.base import utc_now
 from app.db.migrate import migrate
 from app.db.models import AnalysedLogRow, LoggedVehicleRow
 from app.db.session import Database
-from app.log_library.content import AnalysedContent, analyze_content
+from app.log_library.content import analyze_content
+from app.log_library.library_schemas import AnalysedContent
 from app.log_library.stored_logs import store
 from app.main import create_app
 from bench.timing.machine import measured_slowness

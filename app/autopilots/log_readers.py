@@ -4,23 +4,27 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.autopilots.ardupilot.experiments import ArduPilotLoop
 from app.autopilots.ardupilot.log import read_ardupilot
-from app.autopilots.ardupilot.logged_flight import ardupilot_flight
+from app.autopilots.ardupilot.logged_flight import TuningSegment, ardupilot_flight
 from app.autopilots.copter_tlog import copter_steps
 from app.autopilots.frames import frame_of
 from app.autopilots.paparazzi.log import HINT as PAPARAZZI_HINT
 from app.autopilots.paparazzi.log import read_paparazzi
+from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.log import read_px4
 from app.autopilots.px4.logged_flight import px4_flight
 from app.autopilots.recording import Recording
 from app.autopilots.takeoffs import Takeoff, choose, find_takeoffs
 from app.autopilots.tlog import read_tlog
 from app.autopilots.tlog_vehicles import HINT as TLOG_HINT
-from app.core.analysis.loop import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop, LoggedFlight
+from app.core.analysis.segment import FinerSegment, Segment
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.reasons import OTHER_FRAMES
 from app.logs.base import refused
@@ -114,6 +118,16 @@ READERS: Final[Mapping[Format, Reader]] = {
         hint=PAPARAZZI_HINT,
     ),
 }
+
+LOOPS: Final[Mapping[str, type[AltitudeLoop]]] = MappingProxyType(
+    {loop.texts.autopilot: loop for loop in (ArduPilotLoop, Px4Loop)}
+)
+"""Altitude loops of logged flights, by the autopilot in their texts."""
+
+SEGMENTS: Final[Mapping[str, type[Segment]]] = MappingProxyType(
+    {segment.__name__: segment for segment in (Segment, FinerSegment, TuningSegment)}
+)
+"""Kinds of segments of logged flights, by name."""
 
 SUFFIXES: Final = (".csv", *READERS)
 

@@ -8,15 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from app.autopilots.ardupilot.experiments import ArduPilotLoop
-from app.autopilots.ardupilot.logged_flight import TuningSegment
 from app.autopilots.ardupilot.profile import ARDUPILOT
 from app.autopilots.autopilot import Autopilot
 from app.autopilots.paparazzi.profile import PAPARAZZI
-from app.autopilots.px4.experiments import Px4Loop
 from app.autopilots.px4.profile import PX4
-from app.core.analysis.loop import AltitudeLoop
-from app.core.analysis.segment import FinerSegment, Segment
 from app.core.definition import Definition, Flight, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment, ModelledExperiment
@@ -27,16 +22,6 @@ AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType(
     {autopilot.name: autopilot for autopilot in (PAPARAZZI, ARDUPILOT, PX4)}
 )
 """The default first."""
-
-LOOPS: Final[Mapping[str, type[AltitudeLoop]]] = MappingProxyType(
-    {loop.texts.autopilot: loop for loop in (ArduPilotLoop, Px4Loop)}
-)
-"""Altitude loops of logged flights, by the autopilot in their texts."""
-
-SEGMENTS: Final[Mapping[str, type[Segment]]] = MappingProxyType(
-    {segment.__name__: segment for segment in (Segment, FinerSegment, TuningSegment)}
-)
-"""Kinds of segments of logged flights, by name."""
 
 _DEFAULT, *_OTHERS = (autopilot.experiments for autopilot in AUTOPILOTS.values())
 

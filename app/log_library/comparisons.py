@@ -10,7 +10,6 @@ from app.common.errors import InputError, Problem
 from app.core.statistics.gain_change import FlownLog, GainChange, compare_logs, compare_takeoffs
 from app.db.models import AnalysedLogRow
 from app.log_library import repository, stored_answers
-from app.log_library.flights import unpack_flight
 from app.log_library.library_schemas import ErrorChange, LogComparison, StoredAnswer
 from app.log_library.parameter_changes import parameter_changes
 from app.log_library.stored_logs import log_view
@@ -18,26 +17,19 @@ from app.log_library.texts import notes_of, sentence_of
 
 
 def compare(session: Session, log_id: int, before_id: int | None) -> LogComparison:
-    """Compare a log with an earlier one, by default the one before it of the same vehicle.
+    """Compare a log with another one of the same vehicle, by default the one before it.
 
-    Raises NotFoundError; InputError without an earlier one.
+    Raises NotFoundError; InputError without another one, or for one of another vehicle or autopilot.
     """
     log = repository.log_with_answer(session, log_id)
-    earlier = repository.log_before(session, log) if before_id is None else before_id
-    if earlier is None:
-        raise InputError(
-            "There is no earlier log to compare with.",
-            hint="Keep another log of this vehicle, or choose a log.",
-            problems=(Problem("before", "is missing"),),
-        )
-    before = repository.log_with_answer(session, earlier)
-    if log.autopilot != before.autopilot:
-        raise InputError(
-            f"{log.file_name} is not compared with {before.file_name}: they are of different autopilots.",
-            hint=f"Choose another log under {log.autopilot}.",
-            problems=(Problem("before", f"was flown under {before.autopilot}"),),
-        )
-    autopilot = next(each for each in AUTOPILOTS.values() if each.title == log.autopilot)
+    other = repository.log_before(session, log) if before_id is None else before_id
+    if other is None:
+        raise _refused("There is no earlier log to compare with.", "Keep another log of this vehicle.", "is missing")
+    before = repository.log_with_answer(session, other)
+    one, another = ((each.vehicle_id, each.autopilot) for each in (log, before))
+    if other == log_id or log.vehicle_id is None or one != another:
+        happened = f"{log.file_name} is not compared with {before.file_name}."
+        raise _refused(happened, "Choose another log of its vehicle.", "is no other log of its vehicle and autopilot")
     stored = [stored_answers.unpack(each.answer) for each in (before, log)]
     found = _gain_change((before, log), stored)
     gains = found.comparison
@@ -51,8 +43,12 @@ def compare(session: Session, log_id: int, before_id: int | None) -> LogComparis
         is_contradicted=found.is_contradicted,
         sentence=sentence_of(found),
         notes=notes_of(found),
-        parameters=parameter_changes(autopilot, *(each.parameters for each in stored)),
+        parameters=parameter_changes(AUTOPILOTS[log.autopilot], *(each.parameters for each in stored)),
     )
+
+
+def _refused(happened: str, hint: str, reason: str) -> InputError:
+    return InputError(happened, hint=hint, problems=(Problem("before", reason),))
 
 
 def _gain_change(rows: Sequence[AnalysedLogRow], stored: Sequence[StoredAnswer]) -> GainChange:
@@ -69,6 +65,8 @@ def _compare_flights(*logs: tuple[float | None, bytes | None]) -> GainChange:
 
 
 def _flown(error_m: float | None, packed: bytes | None) -> FlownLog:
+    from app.log_library.flights import unpack_flight  # noqa: PLC0415 - imports every reader
+
     if packed is None:
         return FlownLog(error_m=error_m)
     unpacked = unpack_flight(packed)

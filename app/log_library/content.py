@@ -3,7 +3,6 @@
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
 from operator import attrgetter
 from typing import Final, Generic, TypeVar
 
@@ -30,10 +29,9 @@ from app.core.tuning.logged_takeoffs import analyze_takeoffs, score_takeoffs
 from app.figures.panels import Plot
 from app.log_library import descriptions, manoeuvres, replicas, shapes, takeoffs
 from app.log_library.flights import pack_flight
-from app.log_library.library_schemas import LogNumbers
+from app.log_library.library_schemas import AnalysedContent, LogNumbers
 from app.log_library.schemas import (
     LogAnswer,
-    Part,
     PartTexts,
     Refusal,
     ReplicaAnswer,
@@ -79,24 +77,6 @@ def read_start(
     return manoeuvres.start_of(analyze(flown), name) if isinstance(flown, LoggedFlight) else flown
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AnalysedContent:
-    """What an analysis finds: the answer and the figures of its parts; and what the library keeps beside them: numbers
-    for lists, the vehicle's identity, when it flew, its parameters, and the campaign that can start from the log."""
-
-    answer: LogAnswer
-    plots: Mapping[Part, Sequence[Plot]]
-    numbers: LogNumbers
-    hardware_id: str = ""
-    vehicle_name: str = ""
-    flown_at: datetime | None = None
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    fit: LogFit | None = None
-    flight: bytes | None = None
-    takeoffs: Sequence[ScoredTakeoff] = ()
-    definition: Definition | None = None
-
-
 def analyze_content(
     content: bytes, companion: bytes | None, name: str, gains: str = "", vehicle: int | None = None
 ) -> AnalysedContent:
@@ -139,6 +119,7 @@ def analyze_content(
     )
     found = AnalysedContent(
         answer=answer,
+        autopilot=autopilot.name,
         plots={"tuning": tuning.plots, "replica": replica.plots},
         numbers=tuning.numbers,
         fit=tuning.fit,

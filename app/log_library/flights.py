@@ -16,7 +16,7 @@ import zstandard
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from app.autopilots.registry import LOOPS, SEGMENTS
+from app.autopilots.log_readers import LOOPS, SEGMENTS
 from app.common.errors import StorageError
 from app.core.analysis.loop import LoggedFlight
 from app.core.analysis.segment import Segment

@@ -1,6 +1,7 @@
 """API views of analysed logs: kept as flights of a vehicle, or for a few days."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Annotated, Self
 
@@ -9,6 +10,7 @@ from pydantic import Field
 from app.campaigns.schemas import Definition
 from app.common.schemas import Gains, Name, Request, Schema
 from app.core.analysis.analysis import Grade
+from app.core.analysis.combined_fit import LogFit
 from app.core.analysis.description import Description
 from app.core.analysis.shapes import FailureShape
 from app.core.statistics.comparisons import Verdict
@@ -118,6 +120,25 @@ class LoggedVehicle(LoggedVehicleBrief):
     newest: AnalysedLog
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalysedContent:
+    """What an analysis finds: the answer and the figures of its parts; and what the library keeps beside them: numbers
+    for lists, the vehicle's identity, when it flew, its parameters, and the campaign that can start from the log."""
+
+    answer: LogAnswer
+    autopilot: str
+    plots: Mapping[Part, Sequence[Plot]]
+    numbers: LogNumbers
+    hardware_id: str = ""
+    vehicle_name: str = ""
+    flown_at: datetime | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    fit: LogFit | None = None
+    flight: bytes | None = None
+    takeoffs: Sequence[ScoredTakeoff] = ()
+    definition: Definition | None = None
+
+
 class ErrorChange(Schema):
     """Differences of two logs' errors, later − earlier, m, and what of it the models of both flights attribute to what;
     null for what is not known."""
@@ -153,9 +174,6 @@ class CombinedVehicle(Schema):
     thrust_slope: EstimatedValue
     motor_lag_s: EstimatedValue
     drag_1_s: EstimatedValue
-    remaining: Annotated[
-        Mapping[str, float], Field(description="standard deviations as a share of the least that one log alone has")
-    ]
     is_one_vehicle: Annotated[
         bool, Field(description="false: thrust slopes differ, as after a change of propellers or motors")
     ]

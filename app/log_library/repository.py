@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Final
 
-from sqlalchemy import Select, delete, func, select, tuple_
+from sqlalchemy import Select, delete, func, or_, select, tuple_
 from sqlalchemy.orm import Session, joinedload, undefer
 
 from app.db.base import existing
@@ -68,8 +68,9 @@ def vehicle_of_hardware_or_none(session: Session, hardware_id: str) -> LoggedVeh
 
 
 def vehicle_of_name_or_none(session: Session, name: str) -> LoggedVehicleRow | None:
-    """The vehicle of that name, ignoring case."""
-    return session.scalar(select(LoggedVehicleRow).where(func.lower(LoggedVehicleRow.name) == name.lower()).limit(1))
+    """The vehicle of that name, ignoring the case of ASCII letters, as SQLite does."""
+    is_named = or_(LoggedVehicleRow.name == name, func.lower(LoggedVehicleRow.name) == name.lower())
+    return session.scalar(select(LoggedVehicleRow).where(is_named).limit(1))
 
 
 def vehicles(session: Session) -> Sequence[tuple[LoggedVehicleRow, int, AnalysedLogRow]]:

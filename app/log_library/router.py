@@ -155,8 +155,7 @@ def compare_logs(
     log_id: Id,
     before: Annotated[int | None, Query(ge=1, le=2**63 - 1, description="by default the log before it")] = None,
 ) -> LogComparison:
-    """Compare a log with an earlier one of the same vehicle: which parameters changed, and whether the later gains are
-    better."""
+    """Compare a log with another of the same vehicle: which parameters changed, and whether its gains are better."""
     return comparisons.compare(session, log_id, before)
 
 
@@ -183,8 +182,7 @@ def start_stored_campaign(
     vehicle: RegisteredVehicle = None,
 ) -> Campaign:
     """Create the campaign of a stored log, as from its file; 404 for one of takeoffs whose file is not stored."""
-    with database.read() as session:
-        found, name = service.start_of(session, log_id)
+    found, name = service.start_of(database, log_id)
     return act(lambda session: service.start_campaign(session, found, asking, name=name, vehicle_id=vehicle))
 
 

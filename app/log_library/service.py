@@ -3,7 +3,7 @@
 import gzip
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -23,12 +23,9 @@ from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 from app.log_library import repository, stored_logs
-from app.log_library.library_schemas import LogAnalysis
+from app.log_library.library_schemas import AnalysedContent, LogAnalysis
 from app.log_library.takeoffs import logged_takeoffs
 from app.processes.calls import FILE, run_limited
-
-if TYPE_CHECKING:
-    from app.log_library.content import AnalysedContent
 
 EXAMPLE: Final = Path(__file__).parent / "data" / "altitude_steps.bin.gz"
 UNNAMED: Final = "Log"
@@ -38,7 +35,7 @@ _ANY_RECORD: Final = Accepted(confirm=True, invalid=True)
 
 def analyze_limited(
     content: bytes, companion: bytes | None, *, name: str, gains: str = "", vehicle: int | None = None
-) -> "AnalysedContent":
+) -> AnalysedContent:
     """Analyse a log as below in a process with limits, and store nothing."""
     from app.log_library.content import analyze_content  # noqa: PLC0415 - imports every reader and model
 
@@ -53,7 +50,7 @@ def analyze_upload(
     name: str,
     gains: str = "",
     vehicle: int | None = None,
-    analyze: "Callable[..., AnalysedContent]" = analyze_limited,
+    analyze: Callable[..., AnalysedContent] = analyze_limited,
 ) -> LogAnalysis:
     """Analyse a log or trace, by default in a process with limits, and store the answer; if this version has answered
     it before, that one. `companion` is the .log file of Paparazzi's .data file, `gains` those flown, if no log contains
@@ -86,15 +83,17 @@ def read_upload(
     return run_limited(FILE, read_start, content, companion, name, vehicle)
 
 
-def start_of(session: Session, log_id: int) -> tuple[Sequence[Takeoff] | Definition, str]:
+def start_of(database: Database, log_id: int) -> tuple[Sequence[Takeoff] | Definition, str]:
     """What a campaign starts with of a stored log, and its name; its takeoffs are in its file alone. Raises
-    NotFoundError; ConflictError if the file is not stored; InputError if no campaign starts from it."""
-    stored = stored_logs.stored_answer(session, log_id)
-    name, vehicle = stored.answer.file_name, stored.answer.vehicle
-    if stored.definition is not None:
-        return stored.definition, name
-    file = repository.get_file(session, log_id)
-    return read_upload(file.content, file.companion, name=name, vehicle=vehicle), name
+    NotFoundError, also if the file is not stored; InputError if no campaign starts from it."""
+    with database.read() as session:
+        stored = stored_logs.stored_answer(session, log_id)
+        name = stored.answer.file_name
+        if stored.definition is not None:
+            return stored.definition, name
+        file = repository.get_file(session, log_id)
+        content, companion = file.content, file.companion
+    return read_upload(content, companion, name=name, vehicle=stored.answer.vehicle), name
 
 
 def start_campaign(

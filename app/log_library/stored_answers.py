@@ -10,8 +10,7 @@ from app.common.errors import StorageError
 from app.figures.base import Card, card_of
 from app.figures.panels import Line, PanelsFigure, Plot
 from app.figures.theme import ThemeName
-from app.log_library.content import AnalysedContent
-from app.log_library.library_schemas import StoredAnswer
+from app.log_library.library_schemas import AnalysedContent, StoredAnswer
 from app.log_library.schemas import Part
 
 LARGEST_BYTES: Final = 35 * 2**10

@@ -10,6 +10,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app import __version__
+from app.autopilots.registry import AUTOPILOTS
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, StorageError, TooLargeError
 from app.common.schemas import Page
 from app.db.base import added, utc_now
@@ -17,8 +18,8 @@ from app.db.models import AnalysedLogRow, LogFileRow, LoggedVehicleRow
 from app.db.pages import Part, page_of
 from app.fleet import service as fleet
 from app.log_library import repository, stored_answers
-from app.log_library.content import AnalysedContent
 from app.log_library.library_schemas import (
+    AnalysedContent,
     AnalysedLog,
     LogAnalysis,
     LogExport,
@@ -56,7 +57,7 @@ def store(session: Session, found: AnalysedContent, digest: str, file_digest: st
     row = repository.of_digest_or_none(session, digest) or AnalysedLogRow(
         digest=digest, file_digest=file_digest, ordered_at=now
     )
-    row.file_name, row.autopilot = found.answer.file_name, found.answer.autopilot
+    row.file_name, row.autopilot = found.answer.file_name, found.autopilot
     row.grade, row.program = found.answer.tuning.grade, __version__
     row.hardware_id, row.vehicle_name = found.hardware_id, found.vehicle_name
     row.flown_at, row.analysed_at, row.ordered_at = found.flown_at, now, found.flown_at or row.ordered_at
@@ -199,7 +200,8 @@ def stored_answer(session: Session, log_id: int) -> StoredAnswer:
 
 
 def log_view(row: AnalysedLogRow) -> AnalysedLog:
-    return AnalysedLog.view_of(row, numbers=LogNumbers.model_validate(row.numbers))
+    title = AUTOPILOTS[row.autopilot].title
+    return AnalysedLog.view_of(row, autopilot=title, numbers=LogNumbers.model_validate(row.numbers))
 
 
 def _place(session: Session, row: AnalysedLogRow, stored: StoredAnswer) -> LogPlace:

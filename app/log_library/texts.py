@@ -1,6 +1,7 @@
 """What documents and the command line write alike about logs: an answer part by part, its numbers, and parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,6 @@ from app.core.statistics.comparisons import Verdict
 from app.core.statistics.gain_change import GainChange
 from app.log_library.library_schemas import LogComparison, LogNumbers
 from app.log_library.schemas import LogAnswer, Part, PartTexts, Refusal
-from app.log_library.trends import QUANTITIES
 
 
 def parts_of(answer: LogAnswer) -> tuple[tuple[Part, str, PartTexts], ...]:
@@ -27,6 +27,13 @@ def answers_nothing(answer: LogAnswer) -> bool:
     return answer.tuning.grade is Grade.REFUSED and isinstance(answer.replica, Refusal)
 
 
+QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]]]] = (
+    ("Hover throttle", 3, lambda found: None if found.hover_throttle is None else found.hover_throttle.mean),
+    ("Mean deviation (mm)", 1, lambda found: None if found.deviation_m is None else 1e3 * found.deviation_m),
+    ("Throttle activity", 4, attrgetter("activity")),
+    ("Margin", 1, attrgetter("margin")),
+)
+"""Title, decimals and value of a number of a log."""
 NUMBERS: Final = tuple(title for title, *_ in QUANTITIES)
 """Titles of the numbers of a log."""
 
@@ -48,8 +55,8 @@ def changed_texts(found: LogComparison) -> list[tuple[str, str, str, str]]:
 
 
 _SENTENCES: Final[Mapping[Verdict | None, str]] = {
-    "better": "The later gains are better.",
-    "worse": "The later gains are worse.",
+    "better": "The gains of this log are better.",
+    "worse": "The gains of this log are worse.",
     "unresolved": "The gains differ by less than two flights with the same gains do.",
     "not known yet": "The gains are not compared: a log does not have what its model needs.",
     None: "Both logs have the same altitude gains.",

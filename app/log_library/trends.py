@@ -1,9 +1,7 @@
 """What the logs of a vehicle tell together, and over its life."""
 
-from collections.abc import Callable, Sequence
-from operator import attrgetter
+from collections.abc import Sequence
 from statistics import fmean
-from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -17,14 +15,7 @@ from app.log_library import repository
 from app.log_library.library_schemas import CombinedVehicle, LoggedVehicleDetails, LogNumbers
 from app.log_library.schemas import EstimatedValue
 from app.log_library.stored_logs import log_view, vehicle_view
-
-QUANTITIES: Final[Sequence[tuple[str, int, Callable[[LogNumbers], float | None]]]] = (
-    ("Hover throttle", 3, lambda found: None if found.hover_throttle is None else found.hover_throttle.mean),
-    ("Mean deviation (mm)", 1, lambda found: None if found.deviation_m is None else 1e3 * found.deviation_m),
-    ("Throttle activity", 4, attrgetter("activity")),
-    ("Margin", 1, attrgetter("margin")),
-)
-"""Title, decimals and value of a panel."""
+from app.log_library.texts import QUANTITIES
 
 
 def get_vehicle(session: Session, vehicle_id: int) -> LoggedVehicleDetails:
@@ -35,15 +26,14 @@ def get_vehicle(session: Session, vehicle_id: int) -> LoggedVehicleDetails:
 
 def _combined(logs: Sequence[AnalysedLogRow]) -> CombinedVehicle | None:
     """What those under the newest log's autopilot tell together; None if fewer than two tell the vehicle."""
-    fits = [LogFit(**row.fit) for row in logs if row.fit is not None and row.autopilot == logs[-1].autopilot]
+    alike = (row for row in logs if row.autopilot == logs[-1].autopilot)
+    fits = {row.file_digest: LogFit(**row.fit) for row in alike if row.fit is not None}  # a file is evidence once
     if len(fits) < 2:
         return None
-    found = combine(fits)
+    found = combine([*fits.values()])
     hover = EstimatedValue(mean=fmean(found.hover_throttles), deviation=found.hover_spread)
     fitted = {name: EstimatedValue(mean=found.mean[name], deviation=found.deviation[name]) for name in found.mean}
-    return CombinedVehicle(
-        logs=len(fits), hover_throttle=hover, **fitted, remaining=found.remaining, is_one_vehicle=found.is_one_vehicle
-    )
+    return CombinedVehicle(logs=len(fits), hover_throttle=hover, **fitted, is_one_vehicle=found.is_one_vehicle)
 
 
 def trend_figure(session: Session, vehicle_id: int, theme: ThemeName) -> Card:

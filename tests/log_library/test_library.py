@@ -80,6 +80,36 @@ def test_logs_are_kept_by_name_in_the_order_of_their_flights(client: TestClient,
     assert get(client, f"{VEHICLES}/{bee['id']}/trend")["state"] == "ready"
 
 
+def test_a_name_with_other_letters_than_those_of_english_is_found_again(
+    client: TestClient, logs: Mapping[str, int]
+) -> None:
+    """Seen: SQLite makes no small letters of them."""
+    for log in (PX4, COPTER):
+        kept(client, logs[log], "Ärger")
+    assert [(each["name"], each["logs"]) for each in get(client, VEHICLES)] == [("Ärger", 2)]
+
+
+def test_a_log_is_compared_with_another_one_of_its_vehicle_alone(client: TestClient, logs: Mapping[str, int]) -> None:
+    kept(client, logs[COPTER], "Bee")
+    kept(client, logs[PX4], "Wasp")
+    for other in (COPTER, PX4, TAKEOFF):
+        refused = client.get(f"{PATH}/{logs[COPTER]}/comparison", params={"before": logs[other]})
+        assert (refused.status_code, problems_of(refused)) == (
+            422,
+            {"before": "is no other log of its vehicle and autopilot"},
+        )
+
+
+def test_a_file_that_was_analysed_twice_is_evidence_once(
+    client: TestClient, database: Database, logs: Mapping[str, int]
+) -> None:
+    twice = [copied(database, logs[COPTER], digest=f"with other gains {number}") for number in (1, 2)]
+    for log in twice:
+        kept(client, log, "Bee")
+    [bee] = get(client, VEHICLES)
+    assert (bee["logs"], get(client, f"{VEHICLES}/{bee['id']}")["combined"]) == (2, None)
+
+
 def test_a_log_that_is_not_kept_has_none_before_it(client: TestClient, logs: Mapping[str, int]) -> None:
     """Seen: the log analysed before it was, of whatever vehicle."""
     assert get(client, f"{PATH}/{logs[TAKEOFF]}")["log"]["previous_id"] is None
@@ -300,7 +330,7 @@ def test_a_log_after_one_that_it_cannot_be_compared_with_has_a_document_without_
     for log in (PX4, COPTER):
         kept(client, logs[log], "Bee")
     assert client.get(f"{PATH}/{logs[COPTER]}/comparison").status_code == 422
-    change(database, logs[PX4], autopilot="ArduCopter", answer=b"notes")
+    change(database, logs[PX4], autopilot="ardupilot", answer=b"notes")
     assert client.get(f"{PATH}/{logs[COPTER]}/comparison").status_code == 503
     page = client.get(f"{PATH}/{logs[COPTER]}/export.html")
     assert (page.status_code, "Compared with" in page.text) == (200, False)

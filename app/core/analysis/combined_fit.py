@@ -27,6 +27,8 @@ _BETWEEN_MANOEUVRES: Final = 0.03
 """So far apart are the slopes of one vehicle in quiet flights of different manoeuvres."""
 _LEAST_OWN: Final = 0.1
 _LARGEST_CONTRADICTION: Final = 0.99
+_MOST_OF_USUAL: Final = 0.8
+"""Of the variance over vehicles: a log that leaves more of it tells nothing about the slope."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,12 +122,15 @@ def _contradiction(fits: Sequence[LogFit], usual_deviation: float) -> float:
     """How sure it is that the thrust slopes differ: χ² of what each log alone tells of it."""
     from scipy.special import chdtr
 
-    variance = np.array([each.covariance[1][1] for each in fits]) + _BETWEEN_MANOEUVRES**2
-    weight = np.maximum(1.0 / variance - usual_deviation**-2, 1e-6)
-    usual = np.array([each.usual[0][0] for each in fits])
-    alone = usual + (np.array([each.mean[1] for each in fits]) - usual) / variance / weight
+    variances = ((each, each.covariance[1][1] + _BETWEEN_MANOEUVRES**2) for each in fits)
+    tells = [(each, variance) for each, variance in variances if variance < _MOST_OF_USUAL * usual_deviation**2]
+    if len(tells) < 2:
+        return 0.0
+    usual, mean, variance = np.array([(each.usual[0][0], each.mean[1], variance) for each, variance in tells]).T
+    weight = 1.0 / variance - usual_deviation**-2
+    alone = usual + (mean - usual) / variance / weight
     apart = alone - np.average(alone, weights=weight)
-    return float(chdtr(len(fits) - 1, np.sum(weight * apart**2))) if len(fits) > 1 else 0.0
+    return float(chdtr(len(tells) - 1, np.sum(weight * apart**2)))
 
 
 def _named(values: Samples) -> dict[str, float]:

@@ -149,7 +149,7 @@ def _saturated_climb(signals: FlightSignals, _: Description) -> _Numbers:
     """The throttle stays at its upper limit while the reference rises, and the altitude falls behind or the reference
     waits. The numbers are those of the longest time."""
     behind_m, longest, found = signals.reference_m - signals.altitude_m, LEAST_SATURATED_S, None
-    for run in _runs(signals.held & (signals.throttle >= AT_LIMIT)):
+    for run in _runs(signals.held & np.isfinite(behind_m) & (signals.throttle >= AT_LIMIT)):
         lasts_s, rises_m = (float(each[run][-1] - each[run][0]) for each in (signals.time_s, signals.reference_m))
         if lasts_s >= longest and rises_m >= MOVES_M_S * lasts_s:
             longest, largest_m = lasts_s, max(float(behind_m[run].max()), 0.0)

@@ -83,6 +83,13 @@ def test_other_propellers_are_noticed() -> None:
     assert changed.contradiction > 0.999
 
 
+def test_a_log_that_says_nothing_about_the_slope_does_not_tell_of_other_propellers() -> None:
+    """Seen: certain, where the variance was that of vehicles in general."""
+    vague = [replace(told(1.1, 0.1), covariance=np.diag([1e-6, each, 1e-4, 0.01]).tolist()) for each in (0.0615, 0.2)]
+    for each in vague:
+        assert combine([each, told(1.25, 0.05)]).contradiction == 0.0
+
+
 def test_the_hover_throttle_stays_that_of_each_log() -> None:
     found = combine([told(1.2, 0.1, hover=each) for each in (0.38, 0.4, 0.42)])
     assert found.hover_throttles == [0.38, 0.4, 0.42]

@@ -806,8 +806,7 @@ export const storeLogFile = <ThrowOnError extends boolean = false>(options: Opti
 /**
  * Compare Logs
  *
- * Compare a log with an earlier one of the same vehicle: which parameters changed, and whether the later gains are
- * better.
+ * Compare a log with another of the same vehicle: which parameters changed, and whether its gains are better.
  */
 export const compareLogs = <ThrowOnError extends boolean = false>(options: Options<CompareLogsData, ThrowOnError>): RequestResult<CompareLogsResponses, CompareLogsErrors, ThrowOnError> => (options.client ?? client).get<CompareLogsResponses, CompareLogsErrors, ThrowOnError>({ url: '/api/log-analyses/{log_id}/comparison', ...options });
 

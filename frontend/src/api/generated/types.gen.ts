@@ -863,14 +863,6 @@ export type CombinedVehicle = {
     motor_lag_s: EstimatedValue;
     drag_1_s: EstimatedValue;
     /**
-     * Remaining
-     *
-     * standard deviations as a share of the least that one log alone has
-     */
-    remaining: {
-        [key: string]: number;
-    };
-    /**
      * Is One Vehicle
      *
      * false: thrust slopes differ, as after a change of propellers or motors

@@ -10,6 +10,7 @@ import {
 } from "../../api/logAnalyses";
 import { FigurePanel } from "../../charts/FigurePanel";
 import type { PlotlyFigure } from "../../charts/traces";
+import { Aside } from "../../ui/Aside";
 import { count } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
 import { Note } from "../../ui/Note";
@@ -104,6 +105,12 @@ function Combined({ vehicle: { combined } }: { vehicle: LoggedVehicleDetails }) 
           <LabelledValue key={title} title={title} value={plusMinus(scale * mean, scale * deviation, unit)} />
         ))}
       </Box>
+      {!combined.is_one_vehicle && (
+        <Aside tone="bad" role="status">
+          The thrust slopes of these logs differ: propellers, motors or battery may have changed, and these values are
+          those of no vehicle.
+        </Aside>
+      )}
       <Note mt={12} fz="small">
         ± is one standard deviation; that of the hover throttle is from flight to flight.
       </Note>

@@ -80,6 +80,7 @@ const GROUPS: readonly (readonly [ParameterChange["group"], string])[] = [
   ["loop", "Altitude loop"],
   ["other", "Other parameters"],
   ["self-written", "Written by the autopilot itself"],
+  ["unknown", "In one log only"],
 ];
 
 /** The groups that have parameters, gains first. */
