@@ -2,6 +2,7 @@
 numbers by hand, and against the truth."""
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -98,10 +99,10 @@ def test_the_hover_throttle_stays_that_of_each_log() -> None:
 
 @compiled_only
 @pytest.mark.parametrize(
-    "flights",
-    [[simulated_flight(GUSTY, seed=each) for each in (1, 2)], [simulated_px4(seed=each) for each in (1, 2)]],
+    "fly", [lambda seed: simulated_flight(GUSTY, seed=seed), lambda seed: simulated_px4(seed=seed)]
 )
-def test_two_logs_tell_what_their_rows_together_tell(flights: list[LoggedFlight]) -> None:
+def test_two_logs_tell_what_their_rows_together_tell(fly: Callable[[int], LoggedFlight]) -> None:
+    flights = [fly(seed) for seed in (1, 2)]
     fits = [log_fit(fit_copter(each), each.loop) for each in flights]
     stored = [LogFit(**json.loads(json.dumps(asdict(each)))) for each in fits]
     assert combine(stored) == combine(fits)

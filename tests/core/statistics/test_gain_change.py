@@ -111,6 +111,7 @@ def test_an_update_of_the_firmware_is_not_another_gain() -> None:
     assert not has_same_gains(loop, newer.with_gains({"PSC_ACCZ_P": 0.6}))
 
 
+@compiled_only
 def test_gains_of_thrusts_are_the_same_whatever_the_vehicle_weighed() -> None:
     loop = simulated_px4().loop
     assert isinstance(loop, Px4Loop)
