@@ -99,7 +99,7 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_st
     assert f'<define name="HOVER_KP" value="{kp}"/>' in content
     proposed = rows.nth(1).locator("td").all_inner_texts()[1:4]
     page.reload()  # its takeoffs are in the file alone
-    choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"), button="Choose takeoff.tlog")
+    choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"), button="Choose file")
     dashboard.button("Start campaign").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("takeoff")
     assert [trial["gains"] for trial in dashboard.trials(dashboard.campaign_id)] == [{"kp": 283, "ki": 13, "kd": 82}]

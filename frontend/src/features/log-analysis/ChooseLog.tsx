@@ -78,8 +78,10 @@ export function Progress({ analysis: { isPending, error, name } }: Props) {
 export function FileNeeded({ analysis, name, what }: Props & { name: string; what: string }) {
   return (
     <Group gap="8px 14px">
-      <Note>{what} needs the file of the log, which is not stored.</Note>
-      <ChooseLog analysis={analysis}>Choose {name}</ChooseLog>
+      <Note style={{ overflowWrap: "anywhere" }}>
+        {what} needs the file {name}, which is not stored.
+      </Note>
+      <ChooseLog analysis={analysis}>Choose file</ChooseLog>
     </Group>
   );
 }
