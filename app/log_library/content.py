@@ -30,14 +30,7 @@ from app.figures.panels import Plot
 from app.log_library import descriptions, manoeuvres, replicas, shapes, takeoffs
 from app.log_library.flights import pack_flight
 from app.log_library.library_schemas import AnalysedContent, LogNumbers
-from app.log_library.schemas import (
-    LogAnswer,
-    PartTexts,
-    Refusal,
-    ReplicaAnswer,
-    Texts,
-    TuningAnswer,
-)
+from app.log_library.schemas import LogAnswer, PartTexts, Refusal, ReplicaAnswer, Texts, TuningAnswer
 from app.logs.base import HEAD_BYTES
 from app.logs.formats import NEVER_WRITTEN, Format, recognise
 

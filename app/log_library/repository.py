@@ -91,7 +91,6 @@ def vehicles(session: Session) -> Sequence[tuple[LoggedVehicleRow, int, Analysed
 
 def get_file(session: Session, log_id: int) -> LogFileRow:
     """The stored file of a log with its companion. Raises NotFoundError."""
-    get_log(session, log_id)
     return existing(session, LogFileRow, log_id, "file of log")
 
 

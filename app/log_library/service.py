@@ -65,6 +65,7 @@ def analyze_upload(
     found = analyze(content, companion, name=name, gains=gains, vehicle=vehicle)
     with database.write() as session:
         log_id = stored_logs.store(session, found, digest, stored_logs.digest_of(content, companion))
+    with database.read() as session:  # drawing the figures needs no lock
         return stored_logs.get_analysis(session, log_id)
 
 

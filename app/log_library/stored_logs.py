@@ -186,7 +186,7 @@ def store_file(session: Session, log_id: int, content: bytes, companion: bytes |
 
 def file_content(session: Session, log_id: int, *, companion: bool) -> tuple[str, bytes]:
     """Name and content of a stored file, or of the .log file beside it. Raises NotFoundError."""
-    stored, name = repository.get_file(session, log_id), repository.get_log(session, log_id).file_name
+    name, stored = repository.get_log(session, log_id).file_name, repository.get_file(session, log_id)
     if not companion:
         return name, stored.content
     if stored.companion is None:
